@@ -11,7 +11,7 @@ pub(crate) struct AccessLines {
     pub(crate) downlink: Option<LinkModel>,
 }
 
-/// Statistics of the access lines of a host: see `Testbed::access` (feature `files`). A line that the host does not have has counted nothing.
+/// Statistics of the access lines of a host: see `Testbed::access` (feature `files`). A missing line has counted nothing.
 #[derive(Clone, PartialEq, Debug, Default)]
 #[non_exhaustive]
 pub struct AccessStats {

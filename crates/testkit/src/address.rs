@@ -11,7 +11,7 @@ use crate::names::Names;
 
 /// Names and present addresses of all hosts.
 ///
-/// Host number n, counted from 1, has the addresses 10.0.0.n and `fd00::n`, unless the test has chosen others by
+/// Host number n, counted from 1, has the addresses 10.0.0.n and `fd00::n`, unless the test has chosen other addresses by
 /// [`Testbed::address`](crate::Testbed::address). Beyond 255 the addresses go on with 10.0.1.0, as numbers of four bytes do. Addresses given out later, by
 /// [`Host::change_addresses`](crate::Host::change_addresses), follow the addresses of all hosts.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -19,10 +19,10 @@ pub struct AddressPlan {
     names: Arc<Names>,
     /// Short form of the present addresses of each host, of IPv4 and of IPv6, indexed by host.
     current: Vec<[u32; 2]>,
-    /// Host that has the addresses of number `index + 1`, in IPv4 and in IPv6; `None` if the host has other addresses by now. Numbers beyond the end were never
+    /// Owner of the addresses of number `index + 1`, in IPv4 and in IPv6; `None` if the host has other addresses by now. Numbers beyond the end were never
     /// given in turn.
     owners: Vec<[Option<NodeId>; 2]>,
-    /// Hosts whose addresses the test has chosen, by version of IP (true for 6) and short form. Few or none, and looked at after `owners`.
+    /// Hosts with addresses chosen by the test, by version of IP (true for 6) and short form. Few or none, and looked at after `owners`.
     chosen: BTreeMap<(bool, u32), NodeId>,
 }
 
@@ -35,7 +35,7 @@ pub struct Addresses {
     pub v6: Ipv6Addr,
 }
 
-/// Addresses of number 0, which no host has.
+/// Addresses of number 0. No host has the number 0.
 const FIRST: (u32, u128) = (Ipv4Addr::new(10, 0, 0, 0).to_bits(), 0xfd00 << 112);
 
 impl Addresses {
@@ -46,8 +46,8 @@ impl Addresses {
         Self { v4: Ipv4Addr::from_bits(FIRST.0.wrapping_add(number)), v6: Ipv6Addr::from_bits(FIRST.1 + u128::from(number)) }
     }
 
-    /// Returns the address in 32 bits: its distance to the address of number 0 of the same version. For the addresses of hosts this is their number, equal in
-    /// both versions. In IPv6 the loopback address becomes 0, and every address that no host can have becomes `u32::MAX`.
+    /// Returns the address in 32 bits: its distance to the address of number 0 of the same version. For the addresses of hosts the distance is their number,
+    /// equal in both versions. In IPv6 the loopback address becomes 0, and every address that no host can have becomes `u32::MAX`.
     #[inline]
     pub(crate) const fn short(address: IpAddr) -> u32 {
         match address {
@@ -66,7 +66,7 @@ impl Addresses {
         }
     }
 
-    /// Returns the address whose [short](Self::short) form is `short`. For `u32::MAX` in IPv6 the result is an address that no host has, not the original one.
+    /// Returns the address with the [short](Self::short) form `short`. For `u32::MAX` in IPv6 the result is an address of no host, not the original address.
     #[inline]
     pub(crate) fn long(short: u32, is_six: bool) -> IpAddr {
         match (is_six, short) {
@@ -83,14 +83,14 @@ impl Addresses {
         if is_six { short == 0 } else { bits >> 24 == 127 }
     }
 
-    /// Returns whether `short` is a broadcast address of IPv4: 255.255.255.255, or 10.255.255.255, which is that of the network of the hosts.
+    /// Returns whether `short` is a broadcast address of IPv4: 255.255.255.255, or 10.255.255.255, the broadcast address of the network of the hosts.
     #[inline]
     pub(crate) const fn is_broadcast(short: u32) -> bool {
         let bits = short.wrapping_add(FIRST.0);
         bits == u32::MAX || bits == FIRST.0 | 0x00ff_ffff
     }
 
-    /// Returns whether the address belongs to the network of the hosts: 10.0.0.0/8 or `fd00::/8`. Nobody answers at such an address if no host has it. Other
+    /// Returns whether the address belongs to the network of the hosts: 10.0.0.0/8 or `fd00::/8`. Nobody answers at such an address without a host. Other
     /// networks cannot be reached.
     pub(crate) const fn is_of_network(address: IpAddr) -> bool {
         match address {
@@ -104,6 +104,7 @@ impl Addresses {
         let short = Self::short(address);
         match address {
             IpAddr::V4(v4) => {
+                // Addresses from 240.0.0.0 on are reserved (RFC 1112, section 4).
                 let is_special = v4.is_unspecified() || v4.is_loopback() || v4.is_multicast() || v4.octets()[0] >= 240 || Self::is_broadcast(short);
                 (!is_special)
                     .then_some(short)
@@ -125,7 +126,7 @@ impl Addresses {
         }
     }
 
-    /// Returns whether `address` is one of the two.
+    /// Returns whether `address` is an address of the host.
     #[must_use]
     pub fn has(&self, address: IpAddr) -> bool {
         self.like(address) == address
@@ -133,7 +134,7 @@ impl Addresses {
 }
 
 impl AddressPlan {
-    /// Creates the plan. `chosen` has the hosts whose addresses the test has chosen, by version of IP (true for 6), with the short form.
+    /// Creates the plan. `chosen` holds the addresses chosen by the test in short form, by host and version of IP (true for 6).
     pub(crate) fn new(names: Arc<Names>, chosen: &BTreeMap<(NodeId, bool), u32>) -> Self {
         let taken = chosen.iter().map(|((host, is_six), short)| ((*is_six, *short), *host)).collect();
         let mut plan = Self { current: Vec::with_capacity(names.len()), names, owners: Vec::new(), chosen: taken };
@@ -144,12 +145,13 @@ impl AddressPlan {
         for ((host, is_six), short) in chosen {
             let version = usize::from(*is_six);
             let given = std::mem::replace(&mut plan.current[host.index()][version], *short);
+            // The number given in turn would otherwise lead to the host at an address that the host does not have.
             plan.let_go(version, given);
         }
         plan
     }
 
-    /// Gives the next number, of which no test has chosen an address.
+    /// Gives the next number without an address chosen by the test.
     fn fresh(&mut self, host: NodeId) -> u32 {
         loop {
             let number = u32::try_from(self.owners.len() + 1).unwrap_or(u32::MAX);
@@ -162,7 +164,7 @@ impl AddressPlan {
         }
     }
 
-    /// Takes an address that was given in turn from its host.
+    /// Takes an address given in turn away from its host.
     fn let_go(&mut self, version: usize, number: u32) {
         self.owners.iter_mut().skip(Self::place(number)).take(1).for_each(|owner| owner[version] = None);
     }
@@ -198,7 +200,7 @@ impl AddressPlan {
         self.names.find(name).map(|host| self.of(host))
     }
 
-    /// Returns the name of the host that has this address now.
+    /// Returns the name of the present owner of this address.
     #[must_use]
     pub fn owner(&self, address: IpAddr) -> Option<&str> {
         self.owner_node(address).map(|host| &*self.names[host.index()])
@@ -208,9 +210,10 @@ impl AddressPlan {
         self.owner_of(Addresses::short(address), address.is_ipv6())
     }
 
-    /// Returns the host that has the address with the short form `short`.
+    /// Returns the host with the address of the short form `short`.
     #[inline]
     pub(crate) fn owner_of(&self, short: u32, is_six: bool) -> Option<NodeId> {
+        // Most packets go to addresses given in turn, so `owners` is looked at first.
         match self.owners.get(Self::place(short)) {
             Some(owner) if owner[usize::from(is_six)].is_some() => owner[usize::from(is_six)],
             _ if self.chosen.is_empty() => None,
@@ -218,14 +221,14 @@ impl AddressPlan {
         }
     }
 
-    /// Returns the host that has an address which the test has chosen.
+    /// Returns the host with an address chosen by the test.
     #[cold]
     fn chooser_of(&self, short: u32, is_six: bool) -> Option<NodeId> {
         self.chosen.get(&(is_six, short)).copied().filter(|host| self.short(*host, is_six) == short)
     }
 
-    /// Returns whether packets can be sent to the address, even if nobody has it: the address is one of the network of the hosts, or the test has chosen the
-    /// address for a host.
+    /// Returns whether packets can be sent to the address, even to an address of no host: the address belongs to the network of the hosts, or the test has
+    /// chosen the address for a host.
     pub(crate) fn is_reachable(&self, address: IpAddr) -> bool {
         Addresses::is_of_network(address) || self.chosen.contains_key(&(address.is_ipv6(), Addresses::short(address)))
     }

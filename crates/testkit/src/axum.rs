@@ -1,7 +1,7 @@
 //! Unmodified services of axum: [`TcpListener`] implements the trait of listeners of `axum::serve`.
 //!
 //! `axum::serve` starts tasks with `tokio::spawn`: run it [on tokio](crate::Testbed::on_tokio). Such tasks live on no host: a crash of the host does not drop
-//! the tasks, but resets their connections. Responses have a `Date` header, which reads the time of day: two runs differ by the header, unless a layer sets it.
+//! the tasks, but resets their connections. Responses have a `Date` header with the time of day: two runs differ by the header, unless a layer sets the header.
 
 use std::io;
 use std::net::SocketAddr;
@@ -44,7 +44,7 @@ impl Listener for TcpListener {
     }
 }
 
-/// Address of a client, for `into_make_service_with_connect_info`. It takes the place of `SocketAddr`, which only tokio's own listeners give.
+/// Address of a client, for `into_make_service_with_connect_info`. Takes the place of `SocketAddr`, because only tokio's own listeners give a `SocketAddr`.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct ClientAddress(pub SocketAddr);
 

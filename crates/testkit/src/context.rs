@@ -27,7 +27,7 @@ pub(crate) struct Running {
 pub(crate) struct Entered;
 
 impl Running {
-    /// Makes this test bed the one that runs on this thread.
+    /// Makes this test bed the running test bed of this thread.
     ///
     /// # Panics
     ///
@@ -51,18 +51,19 @@ impl Running {
 
 impl Drop for Entered {
     fn drop(&mut self) {
+        // Dropped after the borrow and after `current::end`: the destructors of the run may look for a running test bed, and must find none.
         let left = RUNNING.with_borrow_mut(Option::take);
         current::end();
         drop(left);
     }
 }
 
-/// Returns the test bed that runs on this thread.
+/// Returns the running test bed of this thread.
 pub(crate) fn running() -> Option<Running> {
     RUNNING.with_borrow(Clone::clone)
 }
 
-/// Returns the state of the test bed that runs on this thread.
+/// Returns the state of the running test bed of this thread.
 pub(crate) fn shared() -> Option<Arc<Shared>> {
     RUNNING.with_borrow(|running| running.as_ref().map(|running| Arc::clone(&running.shared)))
 }
@@ -72,7 +73,7 @@ pub(crate) fn try_shared() -> Option<Arc<Shared>> {
     RUNNING.try_with(|running| Some(Arc::clone(&running.try_borrow().ok()?.as_ref()?.shared))).ok()?
 }
 
-/// Returns the test bed that runs on this thread. `what` completes the message of the panic.
+/// Returns the running test bed of this thread. `what` completes the message of the panic.
 ///
 /// # Panics
 ///
@@ -82,7 +83,7 @@ pub(crate) fn expect_running(what: &str) -> Running {
     running().unwrap_or_else(|| panic!("{}", outside_text(what)))
 }
 
-/// Asks the state of the test bed that runs on this thread. `what` completes the message of the panic.
+/// Asks the state of the running test bed of this thread. `what` completes the message of the panic.
 ///
 /// # Panics
 ///
@@ -95,7 +96,7 @@ pub(crate) fn ask<T>(what: &str, question: impl FnOnce(&Arc<Shared>) -> T) -> T 
     })
 }
 
-/// Call that makes a socket, with its place in the test. The call needs a running test bed and a host.
+/// Call for making a socket, with its place in the test. The call needs a running test bed and a host.
 #[derive(Clone, Copy)]
 pub(crate) struct Call {
     name: &'static str,
@@ -117,11 +118,11 @@ impl Call {
         call
     }
 
-    /// Returns the running test bed, and the host of the task being polled. `how` tells in the message what a task without a host must do.
+    /// Returns the running test bed, and the host of the task being polled. `how` is the advice of the message for a task without a host.
     ///
     /// # Panics
     ///
-    /// If there is no test bed or no host. A panic, because a program that retries until it succeeds would swallow an error.
+    /// If there is no test bed or no host. A panic, because a program that retries until success would swallow an error.
     #[track_caller]
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub(crate) fn host(self, how: &str) -> (Arc<Shared>, NodeId) {

@@ -6,7 +6,7 @@ use std::rc::Rc;
 use cohaptic_wan::NodeId;
 
 thread_local! {
-    /// Number of the run; 0 if there is none.
+    /// Number of the run; 0 without a run.
     static RUN: Cell<u64> = const { Cell::new(0) };
     /// Host of the task being polled; `None` for a task without a host.
     static HOST: Cell<Option<NodeId>> = const { Cell::new(None) };
@@ -26,7 +26,7 @@ pub(crate) fn end() {
     drop(TASK.take());
 }
 
-/// Returns the number of the run of this thread, or 0 if there is none. May be called by a value that is dropped while the thread ends.
+/// Returns the number of the run of this thread, or 0 without a run. May be called by a value that is dropped while the thread ends.
 #[inline]
 pub(crate) fn run() -> u64 {
     RUN.get()

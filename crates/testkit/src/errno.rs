@@ -2,7 +2,7 @@
 
 use std::io;
 
-/// Error of a call, as the system names it.
+/// Error of a call, by the names of the system.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(not(feature = "facade"), allow(dead_code, reason = "some are of TCP or of Unix sockets alone"))]
 pub(crate) enum Errno {

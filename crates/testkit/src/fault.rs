@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use cohaptic_units::Excerpt;
 
-/// Error in a text that should describe links or hits, with its place.
+/// Error in a text of links or hits, with the place of the error.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct WordsError {
     excerpt: Excerpt,
@@ -46,7 +46,7 @@ impl fmt::Display for WordsError {
 /// Fault in a line: the range of bytes, and the message.
 pub(crate) type Fault = (Range<usize>, String);
 
-/// Converts a fault of the line `line`, which is line `number` of its text.
+/// Converts a fault of the line `line` with the number `number` in its text.
 pub(crate) fn locate(number: usize, line: &str, (span, message): Fault) -> WordsError {
     let mut excerpt = Excerpt::new(line, span);
     excerpt.line = number;

@@ -59,8 +59,8 @@ impl Host {
         &self.shared
     }
 
-    /// Starts a task that lives on this host. Sockets that the task binds are bound on this host, and the task is dropped at the point at which it waits when
-    /// the host crashes.
+    /// Starts a task on this host. Sockets bound by the task are bound on this host. When the host crashes, the task is dropped at the point at which the task
+    /// waits.
     ///
     /// # Panics
     ///
@@ -121,8 +121,8 @@ impl Host {
         crate::TcpStream::connect_to(&self.shared, self.node, address.to_socket_addrs()?).await
     }
 
-    /// Runs a future as a task of this host: sockets that the future makes belong to this host. Needed for tasks started with `tokio::spawn`, which live on no
-    /// host. A crash of the host does not drop such a task.
+    /// Runs a future as a task of this host: sockets made by the future belong to this host. Needed for tasks started with `tokio::spawn`, because such tasks
+    /// live on no host. A crash of the host does not drop such a task.
     pub fn scope<F: Future>(&self, future: F) -> impl Future<Output = F::Output> + use<F> {
         let node = self.node;
         async move {
@@ -131,9 +131,9 @@ impl Host {
         }
     }
 
-    /// Crashes the host at once: each task is dropped at the point at which the task waits, and all sockets are closed. Packets that the host has sent stay
-    /// under way; packets to the host are lost. Tasks that were not spawned by [`Host::spawn`] or [`Host::start`] (but by `tokio::spawn`, for example) go on,
-    /// and their sockets return errors.
+    /// Crashes the host at once: each task is dropped at the point at which the task waits, and all sockets are closed. Packets from the host stay under way;
+    /// packets to the host are lost. Tasks that were not spawned by [`Host::spawn`] or [`Host::start`] (but by `tokio::spawn`, for example) go on, and their
+    /// sockets return errors.
     ///
     /// # Panics
     ///
@@ -161,14 +161,14 @@ impl Host {
         }
     }
 
-    /// Sends a signal to the program of the host, such as 15 for `SIGTERM`. A program that listens for the signal, by `tokio::signal` of the package that
-    /// `cohaptic tokio` generates, receives the signal. Otherwise the signal does what Linux does by default: 17, 18, 23 and 28 do nothing, and every other
-    /// signal kills the program, as [`Host::kill`] does. Nothing happens to a host that is down.
+    /// Sends a signal to the program of the host, such as 15 for `SIGTERM`. A program that listens for the signal, by `tokio::signal` of the package written by
+    /// `cohaptic tokio`, receives the signal. Otherwise the signal has the default effect of Linux: 17, 18, 23 and 28 do nothing, and every other signal kills
+    /// the program, as [`Host::kill`] does. Nothing happens to a host that is down.
     ///
     /// # Panics
     ///
-    /// Outside of the run. If the number is not that of a signal of Linux that a program can receive: from 1 to 31, without 9, for which there is
-    /// [`Host::kill`], and without those that stop a program, 19 to 22.
+    /// Outside of the run. If no program can receive the signal: the numbers are 1 to 31, without 9, for which there is [`Host::kill`], and without 19 to 22,
+    /// which stop a program.
     #[cfg(feature = "facade")]
     pub fn signal(&self, number: i32) {
         assert!(
@@ -179,13 +179,14 @@ impl Host {
         );
         let running = self.running("signals are sent");
         let is_ignored = matches!(number, 17 | 18 | 23 | 28);
+        // The handlers are asked first: a program that listens for a signal survives the signal.
         if self.is_up() && !running.tasks.others.signals.send(self.node, number) && !is_ignored {
             self.kill();
         }
     }
 
-    /// Brings the host up again. The program of [`Host::start`] starts anew, if there is one. Nothing happens to a host that is up, unless its program was
-    /// killed.
+    /// Brings the host up again. The program of [`Host::start`] starts anew, if the host has a program. Nothing happens to a host that is up, unless the
+    /// program was killed.
     ///
     /// # Panics
     ///
@@ -215,7 +216,7 @@ impl Host {
     ///
     /// # Panics
     ///
-    /// Outside of that run, or on another thread.
+    /// Outside of the run of this host, or on another thread.
     fn running(&self, what: &str) -> Running {
         let running = context::expect_running(what);
         let is_own = Arc::ptr_eq(&running.shared, &self.shared);

@@ -1,10 +1,10 @@
 //! Unmodified clients and servers of hyper, HTTP/1 and HTTP/2.
 //!
-//! A stream wrapped in [`TokioIo`] is the connection that hyper takes on both sides. [`Connector`] opens connections for the client of `hyper-util`.
+//! A stream wrapped in [`TokioIo`] is a connection for hyper on both sides. [`Connector`] opens connections for the client of `hyper-util`.
 //! [`Executor`] runs futures spawned by hyper as tasks of a host, on both runtimes.
 //!
 //! A server of HTTP/1 or 2 adds a `Date` header, which reads the time of day: two runs differ by the header. Turn the header off (`auto_date_header(false)`),
-//! or set it in the response: hyper keeps a header that is set.
+//! or set the header in the response: hyper keeps a header that is set.
 
 use std::future::Future;
 use std::io;
@@ -19,7 +19,7 @@ use hyper_util::rt::TokioIo;
 
 use crate::{Host, TcpStream};
 
-/// Creates a client of `hyper-util` on a host, with a pool of connections from that host. `B` is the body of its requests.
+/// Creates a client of `hyper-util` on a host, with a pool of connections from the host. `B` is the body of the requests.
 #[must_use]
 pub fn client<B>(host: &Host) -> Client<Connector, B>
 where
@@ -29,8 +29,8 @@ where
     Client::builder(Executor::new(host)).build(Connector::new(host))
 }
 
-/// Connector that opens connections from a host to the authorities of URIs, which are names of hosts or addresses. Without a port the connector uses 443 for
-/// `https`, and 80 otherwise. The connector does not encrypt; a connector around this connector can.
+/// Connector for connections from a host to the authorities of URIs: names of hosts, or addresses. Without a port the connector uses 443 for `https`, and 80
+/// otherwise. The connector does not encrypt; a connector around this connector can.
 #[derive(Clone, Debug)]
 pub struct Connector(Host);
 
@@ -67,7 +67,7 @@ impl Connection for TcpStream {
     }
 }
 
-/// Executor that runs futures as tasks of a host. Futures given to it while the host is down are dropped.
+/// Executor for futures as tasks of a host. Futures that come while the host is down are dropped.
 #[derive(Clone, Debug)]
 pub struct Executor(Host);
 

@@ -1,4 +1,4 @@
-//! Links of the library of links, by name, and links that are like them.
+//! Links of the library of links, by name, with factors and keys that change a link.
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Write as _};
@@ -15,8 +15,8 @@ use crate::access::AccessLines;
 
 /// A link of the library, such as `starlink`, `starlink@1/up`, `lte-driving delay*1.4` or `starlink queue.discipline=codel`.
 ///
-/// Links of one kind differ: the delay of a phone in a car is not that of another phone in another car. A factor such as `delay*1.4` says where between them
-/// a link is. It multiplies the number of the key in both directions, or in the only direction for which the library knows how links differ, and has at most
+/// Links of one kind differ: two phones in two cars have different delays. A factor such as `delay*1.4` gives the place of a link between the extremes. The
+/// factor multiplies the number of the key in both directions, or in the only direction for which the library has bounds of the key. A factor has at most
 /// three decimal places. The strategy [`links_like`](crate::strategies::links_like) draws factors (feature `strategies`).
 ///
 /// A key with a value, such as `rate=2Mbit` or `queue={ limit = '250 packets', discipline = 'fq-codel' }`, is laid over the link in both directions and at any
@@ -31,7 +31,7 @@ pub struct LibraryLink {
     direction: Option<Direction>,
     /// Factors in thousandths, by key. The factor 1 is not stored.
     factors: BTreeMap<String, u64>,
-    /// Keys with their values, `KEY=VALUE`, in the order in which they are laid over the link.
+    /// Keys with their values, `KEY=VALUE`, in the order of laying over the link.
     laid: Vec<String>,
     /// Text of the name.
     text: String,
@@ -59,7 +59,7 @@ impl LibraryLink {
     fn with_words(name: ProfileName, words: &[&str]) -> Result<Self, String> {
         let (profile, direction) = (Arc::new(name.profile), name.direction);
         let mut link = Self { profile, direction, factors: BTreeMap::new(), laid: Vec::new(), text: String::new() };
-        // Keys come first, because a key that has a value has no factor.
+        // Values are sorted out first, because a key with a value must have no factor, and the words may come in any order.
         let (laid, factors): (Vec<&str>, Vec<&str>) = words.iter().copied().partition(|word| key_with_value(word).is_some());
         link.laid = laid.into_iter().map(str::to_owned).collect();
         for word in factors {
@@ -88,6 +88,7 @@ impl LibraryLink {
 
     /// Sets the text of the name.
     fn named(mut self) -> Self {
+        // A factor of 1 changes nothing. Without the removal two equal links would have different names.
         self.factors.retain(|_, factor| *factor != ONE);
         self.text = self.profile.title();
         // Writing to a `String` cannot fail.
@@ -110,7 +111,7 @@ impl LibraryLink {
         self.laid.iter().any(|word| key_with_value(word).is_some_and(|laid| laid == key))
     }
 
-    /// Returns the directions in which the key differs from link to link, each with the bounds of the key.
+    /// Returns the directions with bounds for the key, and the bounds. In these directions the key differs from link to link.
     fn directions<'a>(&'a self, key: &'a str) -> impl Iterator<Item = (Direction, &'a [String; 2])> {
         Direction::BOTH.into_iter().filter_map(move |direction| Some((direction, self.profile.line(direction).between.get(key)?)))
     }
@@ -130,6 +131,7 @@ impl LibraryLink {
     fn model(&self, direction: Direction) -> Result<LinkModel, String> {
         let mut keys = vec![format!("profile={}/{}", self.profile.title(), direction.word())];
         for (key, factor) in &self.factors {
+            // A factor applies only to directions in which the library has bounds for the key; the other direction keeps its number.
             if self.directions(key).any(|(known, _)| known == direction) {
                 let scaled = self.quantity(direction, key).and_then(|quantity| quantity.times(*factor)).ok_or("the factor is too large")?;
                 keys.push(format!("{key}={scaled}"));
@@ -169,8 +171,8 @@ impl LibraryLink {
 
 #[cfg(feature = "strategies")]
 impl LibraryLink {
-    /// Returns the keys that differ from link to link, each with the range of the factor in thousandths. The range comes from the first direction; profiles
-    /// have one for both.
+    /// Returns the keys that differ from link to link, each with the range of the factor in thousandths. The range comes from the first direction, because the
+    /// profiles have the same range for both directions.
     pub(crate) fn ranges(&self) -> BTreeMap<String, RangeInclusive<u64>> {
         let range = |key: &str| {
             let (direction, bounds) = self.directions(key).next()?;
@@ -210,6 +212,7 @@ impl Quantity {
     fn read(text: &str) -> Option<Self> {
         let time = || Some(Self { count: u64::try_from(parse::duration(text).ok()?.as_nanos()).ok()?, unit: "ns" });
         let rate = || Some(Self { count: parse::rate(text).ok()?.as_bits_per_sec(), unit: "bit" });
+        // The units of times and rates differ, so at most one of the two readings succeeds.
         time().or_else(rate)
     }
 
@@ -226,6 +229,7 @@ fn words(text: &str) -> Vec<&str> {
     let (mut quote, mut depth) = (None, 0_usize);
     let parts = text.split(|letter: char| {
         match (quote, letter) {
+            // Brackets within quotes do not count, and the other kind of quote is text within a quote.
             (None, '"' | '\'') => quote = Some(letter),
             (None, '{' | '[') => depth += 1,
             (None, '}' | ']') => depth = depth.saturating_sub(1),
@@ -244,7 +248,7 @@ fn key_with_value(word: &str) -> Option<&str> {
     is_key.then(|| key.split('.').next().unwrap_or(key))
 }
 
-/// Reads a factor. Returns `None` unless it is above zero and has at most three decimal places.
+/// Reads a factor. Returns `None` unless the factor is above zero and has at most three decimal places.
 fn thousandths(text: &str) -> Option<u64> {
     let (whole, decimals) = text.split_once('.').unwrap_or((text, "0"));
     let are_digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());

@@ -16,7 +16,7 @@ pub trait ToLink {
     /// If the words describe no link that can be emulated. The message names the place of the error.
     fn to_link(&self) -> LinkModel;
 
-    /// Returns the words of `tc-netem` for the same link, for the test that a failure prints. Empty for the ideal link, `None` for a link that words cannot
+    /// Returns the words of `tc-netem` for the same link, for the test printed after a failure. Empty for the ideal link, `None` for a link that words cannot
     /// describe.
     fn words(&self) -> Option<String> {
         None
@@ -79,6 +79,7 @@ pub(crate) fn parse(words: &str) -> Result<LinkModel, String> {
     if words.trim().is_empty() {
         return Ok(LinkModel::default());
     }
+    // A name of the library is no word of netem, so the library is asked first and a fault of the rest of the name is reported as such.
     if let Some(link) = named(words.trim()) {
         return link;
     }
@@ -86,7 +87,7 @@ pub(crate) fn parse(words: &str) -> Result<LinkModel, String> {
     netem.to_link_config(&mut |_| None).map(LinkModel::from).map_err(|error| format!("`{words}` is not a link: {error}"))
 }
 
-/// Returns the link of the library with a name; `None` if the text is no name of the library.
+/// Returns the link of the library named `text`; `None` if the text is no name of the library.
 #[cfg(feature = "files")]
 pub(crate) fn named(text: &str) -> Option<Result<LinkModel, String>> {
     let link = LibraryLink::parse(text)?.and_then(|link| link.one_way());

@@ -1,7 +1,7 @@
-//! Runtimes of tokio whose loopback is a link, for unchanged test suites.
+//! Runtimes of tokio with a link as loopback, for unchanged test suites.
 //!
-//! The package `tokio` that `cohaptic tokio` generates depends on a copy of this crate that is compiled against the real tokio, and builds its runtimes with a
-//! [`Loopback`] if the environment asks for one.
+//! The package `tokio` written by `cohaptic tokio` depends on a copy of this crate, compiled against the real tokio. The package builds its runtimes with a
+//! [`Loopback`] if the environment asks for a loopback.
 
 use std::env::VarError;
 use std::fmt;
@@ -19,7 +19,7 @@ use crate::seed::{Place, Seed};
 /// of one host, and packets of the host to itself take a link of these words.
 const LOOPBACK_VARIABLE: &str = "COHAPTIC_TEST_LOOPBACK";
 
-/// Link of the loopback of a runtime, and what the runtime has in common with the test beds that run its programs.
+/// Link of the loopback of a runtime, and the parts of the runtime for the test beds of its programs: seed, hook and clock.
 pub struct Loopback {
     words: String,
     seed: u64,
@@ -28,7 +28,7 @@ pub struct Loopback {
 }
 
 impl Loopback {
-    /// Returns the loopback that the environment asks for, or `None` if `COHAPTIC_TEST_LOOPBACK` is not set or empty.
+    /// Returns the loopback asked for by the environment, or `None` if `COHAPTIC_TEST_LOOPBACK` is not set or empty.
     ///
     /// # Panics
     ///
@@ -41,7 +41,7 @@ impl Loopback {
             Err(VarError::NotPresent) => return None,
             Err(VarError::NotUnicode(value)) => value.to_string_lossy().into_owned(),
         };
-        // No closure: the place of the caller would be lost in it.
+        // No closure: `track_caller` would name the place of the closure.
         if value.is_empty() { None } else { Some(Self::new(&value)) }
     }
 
@@ -66,18 +66,18 @@ impl Loopback {
         Self { words: words.to_owned(), seed, hook: Arc::default(), origin: OnceLock::new() }
     }
 
-    /// Returns the seed for the runtime. From the seed, `tokio::select!` chooses where to begin.
+    /// Returns the seed for the runtime. The seed decides with which branch `tokio::select!` begins.
     #[must_use]
     pub const fn seed(&self) -> u64 {
         self.seed
     }
 
-    /// Prepares the builder of the runtime, which must have a single thread.
+    /// Prepares the builder of the runtime. The runtime must have a single thread.
     pub fn prepare(&self, builder: &mut tokio::runtime::Builder) {
         on_tokio::prepare(builder, &self.hook);
     }
 
-    /// Runs `future` on a test bed of one host until the future is over. `block_on` must run the future that it gets on the runtime.
+    /// Runs `future` on a test bed of one host until the future is over. `block_on` must run its argument on the runtime.
     ///
     /// # Panics
     ///

@@ -24,7 +24,7 @@ impl Names {
     ///
     /// # Panics
     ///
-    /// If the name is not valid, another host has it, or there are more hosts than a network can have.
+    /// If the name is not valid, another host has the name, or there are more hosts than a network can have.
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub(crate) fn add(&mut self, name: String) {
         let fault = name_fault(&name);
@@ -104,13 +104,14 @@ impl<N: Into<String>> FromIterator<N> for Names {
     }
 }
 
-/// Returns the bytes of a name by which names are compared.
+/// Returns the bytes of a name for comparisons of names.
 fn key(name: &str) -> impl Iterator<Item = u8> {
     name.strip_suffix('.').unwrap_or(name).bytes().map(|byte| byte.to_ascii_lowercase())
 }
 
-/// Returns why a text is not a valid name of a host, or `None` if it is valid.
+/// Returns why a text is not a valid name of a host, or `None` for a valid name.
 pub(crate) fn name_fault(name: &str) -> Option<String> {
+    // A name stands before a port in `server:80`, in brackets in `[server]:80`, and between blanks in link files.
     let is_word = !matches!(name, "" | ".")
         && !name.contains([':', '[', ']'])
         && !name.contains(char::is_whitespace)

@@ -24,7 +24,7 @@ impl Record {
         Self { seed, recorded }
     }
 
-    /// Returns what each law did.
+    /// Returns the counts of each law.
     pub(crate) fn hits(&self) -> &[HitCount] {
         &self.recorded.hits
     }
@@ -45,9 +45,9 @@ impl Record {
         &self.seed
     }
 
-    /// Returns the fates of the packets from a host to another host on their link, in the form that [`LinkModel::Replay`](cohaptic_wan::LinkModel::Replay)
-    /// replays. With access lines (`Testbed::access`) the fate is that of the whole path, from uplink to downlink. A packet that its link delivered to a host
-    /// that was down, or over a path that was cut, counts as delivered here; the trace tells the end of the packet.
+    /// Returns the fates of the packets from a host to another host on their link, in the form for [`LinkModel::Replay`](cohaptic_wan::LinkModel::Replay). With
+    /// access lines (`Testbed::access`) a fate covers the whole path, from uplink to downlink. A packet delivered by its link to a host that was down, or over
+    /// a path that was cut, counts as delivered here; the trace has the end of the packet.
     ///
     /// # Panics
     ///
@@ -83,6 +83,7 @@ fn complete(mut records: Vec<PacketRecord>) -> FateLog {
     loop {
         match FateLog::new(records.iter().copied()) {
             Ok(log) => return log,
+            // The log is cut before the packet, and tried again: an earlier packet may lack its end too.
             Err(FateLogError::Missing { sequence, .. } | FateLogError::NoEnd { sequence, .. }) => records.retain(|record| record.sequence < sequence),
             // The other errors do not occur in records of a link.
             Err(_) => return FateLog::default(),

@@ -122,6 +122,7 @@ fn of_text(text: &str) -> io::Result<Found> {
             format!("`{text}` is not an address: expected an address such as `10.0.0.1:80`, `[fd00::1]:80` or `server:80`"),
         )
     };
+    // The last colon precedes the port. An address of IPv6 in brackets contains further colons.
     let (name, port) = text.rsplit_once(':').ok_or_else(wrong)?;
     let port = port.parse().map_err(|_| wrong())?;
     match name.strip_prefix('[').and_then(|name| name.strip_suffix(']')) {

@@ -19,8 +19,8 @@ use cohaptic_scene::{Expect, Scene, scene_files};
 ///
 /// # Panics
 ///
-/// If the file cannot be read or makes no sense, with the path, the place and the line; if it has no `[expect]`, or an empty one; if a result differs, with the
-/// expected and the actual value of every such line.
+/// If the file cannot be read or makes no sense, with the path, the place and the line; if the table `[expect]` is missing or empty; if a result differs, with
+/// the expected and the actual value of every such line.
 #[track_caller]
 #[expect(clippy::panic, reason = "a test that fails")]
 pub fn check_scene(path: impl AsRef<Path>) {
@@ -29,7 +29,7 @@ pub fn check_scene(path: impl AsRef<Path>) {
     }
 }
 
-/// Runs [`check_scene`] for all scene files (`.toml`) in a folder and below it, in the order of their paths. Every file is run, even after failures.
+/// Runs [`check_scene`] for all scene files (`.toml`) in a folder and in its subfolders, in the order of their paths. Every file is run, even after failures.
 ///
 /// # Panics
 ///
@@ -47,7 +47,7 @@ pub fn check_scenes(folder: impl AsRef<Path>) {
     }
 }
 
-/// Returns why a scene fails, or `None` if it does not.
+/// Returns why a scene fails, or `None` if all results agree.
 fn failure(path: &Path) -> Option<String> {
     let scene = match Scene::read(path, &[]) {
         Ok(scene) => scene,

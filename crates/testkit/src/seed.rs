@@ -5,7 +5,7 @@ use std::fmt;
 use std::panic::Location;
 use std::thread;
 
-/// Name of the environment variable that sets the seed of every test bed of a process. It takes precedence over the seeds of the tests.
+/// Name of the environment variable for the seed of every test bed of a process. The variable takes precedence over the seeds of the tests.
 pub const SEED_VARIABLE: &str = "COHAPTIC_TEST_SEED";
 
 /// Seed of a test, and its origin.
@@ -45,12 +45,12 @@ impl Seed {
     }
 }
 
-/// Place at which a test bed is run. It does not depend on threads, machines, or edits elsewhere. Its text is the file, a blank and the function, and the
-/// [`hash`] of the text is the seed.
+/// Place at which a test bed is run. The place does not depend on threads, machines, or edits elsewhere. The text of the place is the file, a blank and the
+/// function, and the [`hash`] of the text is the seed.
 ///
-/// The file is that of the call. The function is the path of the program's closure as [`type_name`] returns it: only the identifiers up to the first brace,
-/// joined by `::`. So a plain function has its own path, and the spelling of closures, brackets and generics by the compiler has no influence. Line and column
-/// would depend even less on the compiler, but each edit above would change the seeds of all tests below. They count only where no closure tells the function.
+/// The file is the file of the call. The function is the path of the program's closure in the form of [`type_name`]: only the identifiers up to the first
+/// brace, joined by `::`. So a plain function has its own path, and the spelling of closures, brackets and generics by the compiler has no influence. Line and
+/// column would depend even less on the compiler, but each edit above would change the seeds of all tests below. Line and column count only without a closure.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Place {
     file: String,
@@ -65,7 +65,7 @@ impl Place {
         Self { file: file(Location::caller().file()), function: function(type_name::<P>()) }
     }
 
-    /// Returns the place of the caller by line and column, where no program tells the function.
+    /// Returns the place of the caller by line and column, for callers without a closure.
     #[track_caller]
     pub(crate) fn here() -> Self {
         let caller = Location::caller();
@@ -80,8 +80,8 @@ impl fmt::Display for Place {
     }
 }
 
-/// Returns the path of a source file in a form that is equal on every machine: with slashes. Of an absolute path, which is a file outside of the workspace,
-/// only the name is kept.
+/// Returns the path of a source file in the same form on every machine: with slashes. An absolute path belongs to a file outside of the workspace, and only
+/// the name of the file is kept.
 fn file(path: &str) -> String {
     let path = path.replace('\\', "/");
     let is_absolute = path.starts_with('/') || path.as_bytes().get(1) == Some(&b':');

@@ -16,7 +16,7 @@ use crate::hit::Laws;
 pub(crate) struct Settings {
     /// Size of the receive buffer of a UDP socket \[bytes\].
     pub(crate) receive_buffer: usize,
-    /// Addresses that the test has chosen, in short form, by host and version of IP (true for 6).
+    /// Addresses chosen by the test, in short form, by host and version of IP (true for 6).
     pub(crate) addresses: BTreeMap<(NodeId, bool), u32>,
     /// `true` if the address of IPv6 comes first when a name is looked up.
     pub(crate) six_first: bool,
@@ -36,7 +36,7 @@ pub(crate) struct Settings {
     pub(crate) said: Arc<Said>,
     /// Laws that hit packets.
     pub(crate) laws: Laws,
-    /// Access lines of the hosts that have some.
+    /// Access lines of hosts with access lines.
     pub(crate) access: BTreeMap<NodeId, AccessLines>,
     /// Link for packets of the sender to itself; `None` if such packets arrive at once. The receiver of the link is a host without programs.
     pub(crate) loopback: Option<Path>,

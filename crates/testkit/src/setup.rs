@@ -1,4 +1,4 @@
-//! Parts of a run that test beds and state machines share: hosts, links and limits.
+//! Parts common to runs of test beds and of state machines: hosts, links and limits.
 
 use std::collections::BTreeMap;
 use std::panic::Location;
@@ -17,7 +17,7 @@ use crate::watch::LIMIT;
 use crate::wire::BYTE_LIMIT;
 use crate::words::hits_on;
 
-/// Hosts and the links between them, as the test gave them.
+/// Hosts and links in the form given by the test.
 #[derive(Clone, Debug)]
 pub(crate) struct Setup {
     pub(crate) names: Arc<Names>,
@@ -119,6 +119,7 @@ impl Setup {
     /// Sets all links, their changes, the access lines, the hits and the seed as a file says. The setup must have the hosts of the file.
     pub(crate) fn read(&mut self, file: LinkFile) {
         let LinkFile { hosts, every, links, changes, access, hits, seed } = file;
+        // The setup may have the hosts of the file in another order, so the indices of the file are translated.
         let nodes: Vec<NodeId> = hosts.iter().map(|host| self.names.node(host)).collect();
         self.add_hits(&hits);
         self.every = every;
@@ -129,6 +130,7 @@ impl Setup {
         let said = Arc::make_mut(&mut self.settings.said);
         said.set_models(self.every == LinkModel::default(), self.links.keys().copied());
         self.settings.access.keys().for_each(|host| said.set_access(*host, None));
+        // A seed in the file replaces a seed set before. A later call of `seed` replaces both.
         self.seed = seed.or(self.seed);
     }
 
@@ -181,7 +183,7 @@ impl Setup {
     }
 }
 
-/// Returns the name of a law that has no words: the place where the test gave it.
+/// Returns the name of a law without words: the place where the test gave the law.
 #[track_caller]
 fn place() -> String {
     format!("the law of {}", Location::caller())

@@ -19,7 +19,7 @@ use crate::core::{Registered, Shared, TimerId, registered};
 ///
 /// # Panics
 ///
-/// Outside a running test bed; and if a task asks millions of times without letting time pass, as a busy loop does: use `sleep` there.
+/// Outside a running test bed; and if a task asks millions of times without letting time pass, as a busy loop does: let such a loop `sleep`.
 #[must_use]
 #[inline]
 pub fn now() -> Instant {
@@ -70,6 +70,7 @@ impl Sleep {
         let registered = registered(waker);
         match &mut self.timer {
             Some((timer, known)) => {
+                // The wait may have moved to another task. The timer keeps its place among timers of the same deadline.
                 self.shared.with(|core| core.timers.renew(*timer, waker));
                 *known = registered;
             }
@@ -113,8 +114,8 @@ impl Future for Sleep {
             }
             return Poll::Pending;
         }
-        // The timer has gone off at the moment at which time passed to its deadline, so it need not be cancelled. Without a timer the task has not waited, and
-        // a loop of such waits would let no time pass: the call is counted.
+        // The timer has gone off when time passed to its deadline, and need not be cancelled. Without a timer the task has not waited, and a loop of such waits
+        // would let no time pass: the call is counted.
         if this.timer.take().is_none() {
             this.shared.note_call();
         }
@@ -130,7 +131,7 @@ impl Drop for Sleep {
     }
 }
 
-/// Error of a [`timeout`] whose time was up.
+/// Error of a [`timeout`] after the end of the time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Elapsed;
 
@@ -160,6 +161,7 @@ impl From<Elapsed> for std::io::Error {
 pub async fn timeout<F: Future>(span: Duration, future: F) -> Result<F::Output, Elapsed> {
     let (mut future, mut time) = (pin!(future), pin!(sleep(span)));
     poll_fn(move |cx| {
+        // The future is polled first, so that the future wins at an equal instant.
         if let Poll::Ready(outcome) = future.as_mut().poll(cx) {
             return Poll::Ready(Ok(outcome));
         }
@@ -193,6 +195,7 @@ impl Interval {
     pub async fn tick(&mut self) -> Instant {
         let at = self.next;
         Sleep { shared: Arc::clone(&self.shared), deadline: at, timer: None }.await;
+        // The next tick counts from the scheduled instant and not from now, so that a late task does not shift the ticks after it.
         self.next = at + self.period;
         at
     }

@@ -192,6 +192,7 @@ impl Trace {
     /// Returns the first difference between two runs, or `None` if they are equal.
     #[must_use]
     pub fn first_difference<'a>(&'a self, other: &'a Self) -> Option<Difference<'a>> {
+        // The search ends at the first unequal pair, or where both traces end.
         let place = (0..).find(|place| {
             let (one, other) = (self.events.get(*place), other.events.get(*place));
             one != other || one.is_none()

@@ -11,10 +11,10 @@
 //! hit client -> server: drop 2nd packet
 //! ```
 //!
-//! After the colon follow words of `tc-netem`, which are emulated exactly, or nothing, which is the ideal link, or `replay` and the file of a fate log. `all`
-//! stands for every link that no other line names, wherever the line is in the file; without `all` such links are ideal. `hosts` names the hosts and their
-//! order; without `hosts` the hosts are those named by lines, in the order of the lines. Blanks separate names from the arrow. `hit` and a path before the
-//! colon tell which packets of the path are [hit](crate::hit).
+//! After the colon follow words of `tc-netem` for an exact emulation, or nothing for the ideal link, or `replay` and the file of a fate log. `all` stands for
+//! every link without a line of its own, wherever the line of `all` is in the file; without `all` such links are ideal. `hosts` names the hosts and their
+//! order; without `hosts` the lines name the hosts, in the order of the lines. Blanks separate names from the arrow. `hit` and a path before the colon hit
+//! [packets](crate::hit) of the path.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -45,7 +45,9 @@ pub(crate) struct Words {
 /// Parses a text. `file` reads the file of a fate log, by the path in the text.
 pub(crate) fn parse(text: &str, mut file: impl FnMut(&str) -> Result<String, String>) -> Result<Words, WordsError> {
     let mut reader = Reader::default();
+    // An error about the whole text needs a line to mark, also in an empty text.
     let mut last = (1, "");
+    // An editor may have put a byte order mark before the first line.
     for (number, line) in (1..).zip(text.trim_start_matches('\u{feff}').lines()) {
         reader.line(line, &mut file).map_err(|fault| locate(number, line, fault))?;
         last = (number, line);
@@ -112,6 +114,7 @@ impl Reader {
                 let whole = subject[0].start..subject[2].end;
                 let link = link(line, &rest, file)?;
                 let is_known =
+                    // Both directions of `<->` are inserted, and either of them may be given twice.
                     self.links.insert(pair, link.clone()).is_some() || arrow == "<->" && self.links.insert((pair.1, pair.0), link).is_some();
                 if is_known { Err(twice(&whole, "this link")) } else { Ok(()) }
             }
@@ -225,6 +228,7 @@ fn rest_of(line: &str, subject: &Range<usize>, rest: &[Range<usize>]) -> Range<u
 fn tokens(line: &str, part: Range<usize>) -> Vec<Range<usize>> {
     let mut tokens = Vec::new();
     let mut begin = None;
+    // Places count from the beginning of the line, so that a fault marks its words in the line as written.
     for (place, c) in line[part.clone()].char_indices().map(|(place, c)| (part.start + place, c)) {
         if c.is_whitespace() {
             tokens.extend(begin.take().map(|begin| begin..place));
@@ -241,6 +245,7 @@ fn link(line: &str, words: &[Range<usize>], file: &mut impl FnMut(&str) -> Resul
     let (Some(first), Some(last)) = (words.first(), words.last()) else { return Ok(LinkModel::default()) };
     let whole = first.start..last.end;
     if &line[first.clone()] == "replay" {
+        // The path of a log may contain blanks, so all words after `replay` are the path.
         let [_, _, ..] = words else { return Err((whole.end..whole.end, "expected the file of a fate log after `replay`".to_owned())) };
         let path = words[1].start..last.end;
         let log = file(&line[path.clone()]).and_then(|text| FateLog::parse(&text).map_err(|error| error.to_string()));
@@ -250,6 +255,7 @@ fn link(line: &str, words: &[Range<usize>], file: &mut impl FnMut(&str) -> Resul
         return link.map_err(|message| (whole, message));
     }
     let netem = Netem::parse(&line[whole.clone()]).map_err(|error| {
+        // The parser of netem counts from the beginning of the words.
         let span = whole.start + error.span.start..whole.start + error.span.end;
         (span, error.to_string())
     })?;

@@ -18,7 +18,7 @@ use crate::names::Names;
 use crate::seed::Seed;
 use crate::trace::PacketName;
 
-/// Parts of a test bed that a printed test needs to repeat a run.
+/// Parts of a test bed for a printed test that repeats a run.
 #[derive(Clone, Debug)]
 pub(crate) struct Again {
     pub(crate) names: Arc<Names>,
@@ -31,12 +31,12 @@ pub(crate) struct Again {
     pub(crate) place: &'static Location<'static>,
 }
 
-/// Effects of chance in a run.
+/// Effects of chance in a run, as far as a printed test can repeat the effects.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Drawn {
     /// Packets that links have lost by chance; only the first [`MOST_LOST`] packets.
     pub(crate) lost: Vec<PacketName>,
-    /// Whether programs or connections of TCP have drawn random numbers, or links were changed during the run.
+    /// `true` if programs or connections of TCP have drawn random numbers, or links were changed during the run.
     pub(crate) has_drawn: bool,
 }
 
@@ -44,8 +44,8 @@ pub(crate) struct Drawn {
 pub(crate) const MOST_LOST: usize = 64;
 
 impl Again {
-    /// Returns the calls of the builder that make the network, one per line. Chance is repeated by the seed, or replaced by hits on the packets that chance has
-    /// lost, whichever is shorter.
+    /// Returns the calls of the builder for the network, one per line. Chance is repeated by the seed, or replaced by hits on the packets lost by chance: the
+    /// shorter text is returned.
     pub(crate) fn network(&self, drawn: &Drawn) -> Vec<String> {
         let seeded = self.lines(None, self.needs_seed(drawn));
         let Some(lost) = self.lost(drawn) else { return seeded };
@@ -62,6 +62,7 @@ impl Again {
             Some(program::Call { method, program }) => (&**method, program.clone()),
             None => ("run", format!("/* the program of the call at {} */", self.place)),
         };
+        // Outside of the test harness the test is named by file, line and column, with characters that a name of a function must not have.
         let last = self.seed.test.rsplit("::").next().unwrap_or_default();
         let name: String = last.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
         // Writing to a `String` cannot fail.

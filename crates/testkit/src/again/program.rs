@@ -1,4 +1,4 @@
-//! Programs of tests, read from the source files of the tests.
+//! Programs of tests, as read from the source files of the tests.
 
 use std::fs;
 use std::panic::Location;
@@ -19,8 +19,8 @@ pub(super) fn call(place: &Location<'_>) -> Option<Call> {
     read(&text[begin..])
 }
 
-/// Returns the path of a source file. `file` is relative to the folder in which the compiler ran, which is the folder of the workspace; a test runs in the
-/// folder of its package.
+/// Returns the path of a source file. `file` is relative to the folder of the compiler, usually the folder of the workspace. A test runs in the folder of its
+/// package, so all folders above are tried.
 fn source(file: &str) -> Option<PathBuf> {
     let here = std::env::current_dir().ok()?;
     here.ancestors().map(|folder| folder.join(Path::new(file))).find(|path| path.is_file())
@@ -46,6 +46,7 @@ const INDENT: usize = 8;
 /// Returns the program with its lines after the first moved, so that the outermost of these lines are indented like the call.
 fn indented(program: &str) -> String {
     let depth = |line: &str| line.len() - line.trim_start().len();
+    // The first line follows the parenthesis of the call, so its indentation in the source says nothing about the other lines.
     let least = program.lines().skip(1).filter(|line| !line.trim().is_empty()).map(depth).min().unwrap_or(0);
     let mut lines = program.lines();
     let mut text = lines.next().unwrap_or_default().to_owned();
@@ -65,6 +66,7 @@ fn closing(text: &str) -> Option<(usize, bool)> {
     let (mut place, mut depth, mut has_long_text) = (0, 0_usize, false);
     while place < bytes.len() {
         let rest = &text[place..];
+        // Parentheses within comments, strings and characters do not count. A whole comment or string is one step.
         let len = match bytes[place] {
             b'(' | b'[' | b'{' => {
                 depth += 1;

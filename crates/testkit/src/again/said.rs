@@ -7,7 +7,7 @@ use cohaptic_wan::{NodeId, Path};
 
 use crate::link::ToLink;
 
-/// Links of a test bed in words, as far as they have words.
+/// Links of a test bed in words, as far as the test gave words.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Said {
     every: Words,
@@ -65,6 +65,7 @@ pub(super) enum Chance {
 impl Chance {
     fn of(netem: &Netem) -> Self {
         let happens = |chance: Option<&ChanceSpec>| chance.is_some_and(|chance| chance.percent > Percent::ZERO);
+        // Every part with chance other than loss is looked for: only pure losses can be replaced by a list of lost packets.
         let jitters = netem.delay.as_ref().and_then(|delay| delay.jitter.as_ref()).is_some_and(|jitter| !jitter.time.is_zero());
         let slots = netem.slot.as_ref().is_some_and(|slot| !matches!(slot.gap, SlotGap::Range { max: None, .. }));
         let others = [netem.corrupt.as_ref(), netem.duplicate.as_ref(), netem.reorder.as_ref().map(|reorder| &reorder.chance)];

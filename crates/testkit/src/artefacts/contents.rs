@@ -90,6 +90,7 @@ fn capture(record: &Record, path: Path, from: &str, to: &str) -> Vec<u8> {
         for seen in record.packets_of(path) {
             let packet = seen.record.with_path(seen.part);
             #[cfg(feature = "tcp")]
+            // A segment is a whole IP packet. A datagram is a content, around which the writer puts headers.
             if segments.contains(&packet.sequence) {
                 capture.write_packet(&packet, &seen.payload)?;
                 continue;
@@ -112,10 +113,10 @@ fn segments(record: &Record, path: Path) -> std::collections::BTreeSet<u64> {
     record.trace().events().iter().filter_map(number).collect()
 }
 
-/// Longest part of a file's name that comes from a host's name \[characters\].
+/// Maximum length of the part of a file's name for a host's name \[characters\].
 const LONGEST: usize = 60;
 
-/// Converts a name to a part of a file's name that every system permits.
+/// Converts a name to a part of a file's name with characters permitted by every system.
 pub(super) fn file_name(name: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' || c == '_' { c } else { '_' };
     name.chars().map(plain).take(2 * LONGEST).collect()
@@ -126,6 +127,7 @@ fn file_names(hosts: &[String]) -> Vec<String> {
     let mut taken = std::collections::BTreeSet::new();
     let name = |(place, host): (usize, &String)| {
         let plain: String = file_name(host).chars().take(LONGEST).collect();
+        // Different names can become equal by the conversion. The index of the host tells such names apart.
         let alone = if taken.contains(&plain.to_ascii_lowercase()) { format!("{plain}-{place}") } else { plain };
         taken.insert(alone.to_ascii_lowercase());
         alone

@@ -1,4 +1,4 @@
-//! Folder that is written as a whole.
+//! Folder written as a whole.
 
 use std::fs;
 use std::io;
@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::WriteError;
 
-/// First words of the marked file, by which a folder of a test bed is recognised.
+/// First words of the marked file. A folder with such a file was written by a test bed.
 pub(super) const MARK: &str = "What happened in a test bed";
 
 /// Name of the marked file.
@@ -25,6 +25,7 @@ pub(super) fn replace(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), 
     let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
     fs::create_dir_all(parent).map_err(failed(parent))?;
     let count = COUNT.fetch_add(1, Ordering::Relaxed);
+    // In the same parent, because a rename works only within a file system.
     let beside = |what: &str| parent.join(format!(".{}.{}-{count}.{what}", name.to_string_lossy(), std::process::id()));
     let (new, old) = (beside("new"), beside("old"));
     let written = write_all(&new, files).and_then(|()| put(&new, folder, &old));

@@ -1,4 +1,4 @@
-//! Files that a failing test leaves behind.
+//! Files left behind by a failing test.
 
 mod contents;
 mod folder;
@@ -12,7 +12,7 @@ use crate::record::Record;
 use crate::seed::Seed;
 use crate::wire::HitCount;
 
-/// Name of the environment variable with a folder. Every failing test bed writes a record into a subfolder with the name of the test.
+/// Name of the environment variable for a folder. Every failing test bed writes a record into a subfolder with the name of the test.
 pub const ARTEFACTS_VARIABLE: &str = "COHAPTIC_TEST_ARTEFACTS";
 
 /// Error of writing a record into a folder.
@@ -62,7 +62,7 @@ impl std::error::Error for WriteError {
 impl Record {
     /// Writes the record into a folder, for readers and for replays:
     ///
-    /// - `summary.txt`: the seed, how to repeat the run, the counts of every link, and the packets that every [law](crate::hit) has hit;
+    /// - `summary.txt`: the seed, how to repeat the run, the counts of every link, and the packets hit by every [law](crate::hit);
     /// - `trace.txt`: the events of the run, in words;
     /// - `fates-a-to-b.csv`: the fate of every packet from `a` to `b` on its link, for every two hosts between which a packet was sent. The file can be
     ///   [read back](cohaptic_wan::FateLog::parse) and [replayed](cohaptic_wan::LinkModel::Replay);
@@ -75,7 +75,7 @@ impl Record {
     ///
     /// # Errors
     ///
-    /// [`WriteError`] if the system refuses, or there is something else at the path; nothing was changed then.
+    /// [`WriteError`] if the system refuses, or the path belongs to other files. Nothing was changed in either case.
     pub fn write(&self, folder: impl AsRef<Path>) -> Result<(), WriteError> {
         folder::replace(folder.as_ref(), &contents::files(self))
     }
@@ -98,7 +98,7 @@ impl Artefacts {
         Self { folders: said.into_iter().chain(named).collect() }
     }
 
-    /// Returns whether any record is to be written.
+    /// Returns whether a record is to be written.
     pub(crate) const fn is_wanted(&self) -> bool {
         !self.folders.is_empty()
     }
@@ -116,6 +116,7 @@ impl Artefacts {
     pub(crate) fn lines(&self, seed: &Seed, hits: &[HitCount], record: impl FnOnce() -> Record) -> Vec<String> {
         let mut lines = Vec::new();
         if self.is_wanted() {
+            // Made only here, because following all packets to their ends takes time.
             let record = record();
             for folder in &self.folders {
                 match record.write(folder) {

@@ -27,8 +27,8 @@ impl Testbed {
         self
     }
 
-    /// Puts the address of IPv6 first when the name of a host is looked up. The default is that of IPv4. Programs that try each address in turn use the second
-    /// address only if the first one fails.
+    /// Puts the address of IPv6 first when the name of a host is looked up. By default the address of IPv4 comes first. Programs that try each address in turn
+    /// use the second address only after a failure of the first address.
     pub const fn ipv6_first(mut self) -> Self {
         self.setup.settings.six_first = true;
         self

@@ -1,4 +1,4 @@
-//! Parts of a test bed that a printed test needs to repeat a run.
+//! Parts of a test bed for a printed test that repeats a run.
 
 use std::panic::Location;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use crate::settings::{Limits, Settings};
 use crate::setup::RECEIVE_BUFFER;
 
 impl Testbed {
-    /// Returns the parts of the test bed that a printed test needs to repeat a run.
+    /// Returns the parts of the test bed for a printed test that repeats a run.
     pub(super) fn again(&self, seed: &Seed, place: &'static Location<'static>) -> Again {
         let Settings { receive_buffer, limits, said, laws, .. } = &self.setup.settings;
         let default = Limits::default();
@@ -24,6 +24,7 @@ impl Testbed {
         let has_constants = !self.tcp.is_empty();
         #[cfg(not(feature = "tcp"))]
         let has_constants = false;
+        // Only settings that differ from the defaults are printed, so that the printed test stays short.
         let others = [
             (*receive_buffer != RECEIVE_BUFFER).then(|| format!(".receive_buffer({receive_buffer})")),
             (limits.time != default.time).then(|| format!(".time_limit({})", nanos(limits.time))),

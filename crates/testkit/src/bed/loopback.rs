@@ -1,4 +1,4 @@
-//! Test bed of one host whose loopback is a link.
+//! Test bed of one host with a link as loopback.
 
 use std::future::Future;
 use std::panic::Location;

@@ -1,4 +1,4 @@
-//! Test bed: its parts, and its run.
+//! Test bed: parts and run.
 
 mod addresses;
 mod again;
@@ -63,7 +63,7 @@ use crate::wire::Recorded;
 #[must_use = "a test bed does nothing until it is run"]
 pub struct Testbed {
     setup: Setup,
-    /// Constants of TCP of the hosts whose constants are not the defaults of Linux.
+    /// Constants of TCP of hosts with other constants than the defaults of Linux.
     #[cfg(feature = "tcp")]
     tcp: BTreeMap<NodeId, TcpConfig>,
     #[cfg(feature = "tokio")]
@@ -143,9 +143,9 @@ impl Testbed {
     /// host last passes the *downlink*, towards the user. In between is the link from host to host, ideal unless the test says otherwise. Packets to all other
     /// hosts share the uplink and wait for each other there.
     ///
-    /// A modulator of the link, of its rate for example, changes uplink and downlink of one host together, and those of two hosts apart.
-    /// [`Bed::access_stats`] returns what the lines did, and the trace tells on which part of its path a packet was lost. A packet that a
-    /// [hit](crate::hit) drops has passed the uplink, and goes no further.
+    /// A modulator of the link, of its rate for example, changes uplink and downlink of one host together, and the access lines of two hosts apart.
+    /// [`Bed::access_stats`] returns the statistics of the lines, and the trace names the part of the path on which a packet was lost. A packet dropped by a
+    /// [hit](crate::hit) has passed the uplink, and goes no further.
     ///
     /// ```
     /// use cohaptic_testkit::{Instant, Testbed, time};
@@ -306,6 +306,7 @@ impl Testbed {
         self.setup.settings.traces = true;
         let seed = Seed::choose(self.setup.seed, &Place::of(&program));
         let (outcome, first) = self.clone().run_once(&seed, &program, Location::caller());
+        // The same seed and place: every difference of the traces comes from the program itself.
         let (_, second) = self.run_once(&seed, &program, Location::caller());
         if let Some(difference) = first.trace().first_difference(second.trace()) {
             panic!(
@@ -349,7 +350,7 @@ impl Testbed {
         if artefacts.is_wanted() {
             setup.record();
         }
-        // The program of a run on a loopback is a runtime of a program that knows no test bed, which no printed test could repeat.
+        // A run on a loopback runs the runtime of a program without a test bed of its own. No printed test could repeat such a run.
         let has_test = setup.settings.loopback.is_none();
         let (link, names) = (setup.links(), setup.names);
         #[cfg_attr(not(feature = "tcp"), expect(unused_mut, reason = "only TCP has constants"))]
@@ -363,15 +364,18 @@ impl Testbed {
         let kind = Kind::Own;
         let watched = Watched::begin(kind, &names, setup.stall_limit, seed, &artefacts);
         let run = || execute(core, names.len(), &watched, &mut recorded);
+        // The panic is caught, because the report needs the record, which `execute` stores while the panic unwinds.
         let outcome = catch_unwind(AssertUnwindSafe(|| failure::__rust_begin_short_backtrace(run)));
         // The watchdog ends here: the report of a panic may take long.
         let panicked = watched.pulse.running().map(|runner| runner.words(&names));
         drop(watched);
+        // A run that failed before its start has no record.
         let mut recorded = recorded.unwrap_or_else(|| Recorded { trace: Trace::new(Arc::clone(&names)), ..Recorded::default() });
         let drawn = std::mem::take(&mut recorded.drawn);
         let record = Record::new(seed.clone(), recorded);
         match outcome {
             Ok(outcome) => {
+                // The run has succeeded, but a property may still fail with the outcome. The record is copied only while a strategy searches.
                 failure::note_run(|| {
                     let record = record.clone();
                     Box::new(move || artefacts.report(None, again.test(&drawn, false), record))

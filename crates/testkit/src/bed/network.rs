@@ -7,8 +7,8 @@ use crate::link::ToLink;
 use crate::strategies::{ImpairedLink, ImpairedNetwork};
 
 impl Testbed {
-    /// Sets the links to those of a network that a strategy has drawn, or that a printed test contains. Host number n of the network is host number n of this
-    /// test bed.
+    /// Sets all links to the links of a network. A strategy has drawn the network, or a printed test contains the network. Host number n of the network is host
+    /// number n of this test bed.
     ///
     /// # Panics
     ///

@@ -165,7 +165,7 @@ impl Bed {
         self.shared.with(|core| core.wire.hits(path))
     }
 
-    /// Returns all ends of TCP connections that are not over, sorted by host, port and peer. Ends that no program holds any more are included.
+    /// Returns all ends of TCP connections that are not over, sorted by host, port and peer. Ends are included that no program holds any more.
     #[cfg(feature = "tcp")]
     #[must_use]
     pub fn connections(&self) -> Vec<crate::tcp::ConnectionInfo> {

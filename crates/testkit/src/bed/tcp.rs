@@ -6,7 +6,7 @@ use super::Testbed;
 use crate::tcp::TcpConfig;
 
 impl Testbed {
-    /// Sets the constants of TCP on all hosts. The defaults are those of Linux: [`TcpConfig::default`].
+    /// Sets the constants of TCP on all hosts. The defaults are the constants of Linux: [`TcpConfig::default`].
     ///
     /// # Panics
     ///
@@ -17,7 +17,7 @@ impl Testbed {
         self
     }
 
-    /// Sets the constants of TCP on one host. Call this after [`Testbed::tcp`], which sets all hosts.
+    /// Sets the constants of TCP on one host. Call this after [`Testbed::tcp`], because [`Testbed::tcp`] sets all hosts.
     ///
     /// # Panics
     ///

@@ -25,7 +25,7 @@ pub(super) struct Elsewhere {
 struct Left {
     /// Text of the first fault of the test: another thread used a value of the run, or a task without a host made a socket.
     misuse: Option<String>,
-    /// Acts in the order in which they were left.
+    /// Acts, in the order of leaving.
     acts: Vec<Act>,
 }
 
@@ -116,6 +116,7 @@ impl Shared {
 
     /// Releases a value of the run with `act`: now if this thread may ask the state, otherwise when the task polled by the thread of the run has returned.
     pub(crate) fn release(&self, act: impl FnOnce(&mut Core) + Send + 'static) {
+        // A destructor may run on another thread, or in the middle of a borrow of the state. The act then waits.
         if self.may_be_asked() {
             self.with(act);
         } else {

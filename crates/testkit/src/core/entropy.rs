@@ -27,6 +27,7 @@ impl Entropy {
     pub(crate) fn fill(&mut self, buffer: &mut [u8]) {
         let mut draws = self.stream.packet(self.asked).draws(Purpose::InitialState);
         self.asked += 1;
+        // Little-endian on every machine, so that equal seeds give equal bytes.
         for chunk in buffer.chunks_mut(8) {
             chunk.copy_from_slice(&draws.next_word().to_le_bytes()[..chunk.len()]);
         }
@@ -62,6 +63,7 @@ impl ByHost {
     /// Returns the source of a host. `names` are the names of all hosts, indexed by host.
     pub(crate) fn of(&mut self, host: Option<NodeId>, names: &[String]) -> &mut Entropy {
         let Self { seed, label, streams } = self;
+        // A source is made at its first request, so `was_asked` knows whether any program has drawn.
         streams.entry(host).or_insert_with(|| {
             let name = host.map_or_else(String::new, |host| format!(" of {}", names[host.index()]));
             Entropy::labelled(*seed, &[*label, name.as_bytes()].concat())

@@ -55,6 +55,7 @@ impl Face {
     /// Counts a poll of a task. Returns the patience if the tasks were polled more often than that since time last passed.
     #[cfg(feature = "tokio")]
     pub(super) fn count_poll(&self) -> Option<u64> {
+        // Only the thread of the run polls tasks, so a load and a store suffice in place of a locked addition.
         let polled = self.polled.load(Ordering::Relaxed) + 1;
         self.polled.store(polled, Ordering::Relaxed);
         (polled > self.patience).then_some(self.patience)

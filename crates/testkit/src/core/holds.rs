@@ -1,4 +1,4 @@
-//! Work on other threads, for which the time of the run waits.
+//! Work on other threads, during which the time of the run does not pass.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};

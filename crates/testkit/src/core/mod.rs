@@ -197,6 +197,7 @@ impl Core {
 
     pub(crate) fn set_link(&mut self, path: Path, link: LinkModel) {
         self.wire.set_link(self.now(), path, link);
+        // Packets that the new link lets go at once arrive before the caller continues.
         self.take_arrivals();
     }
 }
@@ -236,6 +237,7 @@ impl Core {
         }
         state.bound = Bound::default();
         let now = self.now();
+        // A dead socket stays in memory until its handle is dropped, so that the next call of the program returns the error.
         for socket in self.sockets.all_of(host) {
             socket.die(now, &mut self.wire.held, &mut self.woken);
         }
@@ -252,8 +254,10 @@ impl Core {
         if !self.is_up(host) {
             return;
         }
+        // Noted before the sockets are closed: the record has the kill before the segments that the closing sends.
         self.wire.note(Happening::Killed(host));
         let state = &mut self.hosts[host.index()];
+        // For `restart`, which starts the program anew only if the program is gone.
         state.is_idle = true;
         state.bound = Bound::default();
         let now = self.now();

@@ -186,7 +186,7 @@ impl Core {
 }
 
 impl Core {
-    /// Delivers the packets that have come out of the links, until none is left.
+    /// Delivers all packets that have come out of the links.
     #[cfg_attr(not(feature = "tcp"), expect(clippy::never_loop, reason = "only TCP has packets that do not leave their host"))]
     pub(super) fn take_arrivals(&mut self) {
         loop {
@@ -212,7 +212,7 @@ impl Core {
         if self.settings.loopback == Some(path) { path.from } else { path.to }
     }
 
-    /// Returns the link that packets of `host` to itself take, or `None` if such packets arrive at once.
+    /// Returns the link for packets of `host` to itself, or `None` if such packets arrive at once.
     pub(super) fn loopback_of(&self, host: NodeId) -> Option<Path> {
         self.settings.loopback.filter(|path| path.from == host)
     }

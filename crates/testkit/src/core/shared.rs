@@ -1,8 +1,8 @@
 //! Access of tasks to the state machine.
 //!
 //! During a run the state lies with the thread that polls the tasks, and each call borrows the state there. [`Shared::with`] is the only way to the state. A
-//! borrow takes a few instructions and no atomic operation, where a mutex takes two, and each datagram borrows three times: when it is sent, when it is
-//! received, and when its reader waits again. Other threads have no part in a run: see [`elsewhere`](super::elsewhere).
+//! borrow takes a few instructions and no atomic operation, where a mutex takes two. Each datagram borrows three times: for sending, for receiving, and for
+//! the next wait of the reader. Other threads have no part in a run: see [`elsewhere`](super::elsewhere).
 //!
 //! Before and after the run the state lies behind the mutex `home`. If other threads read the state during the run, the state stays in `home` all the time: the
 //! watchdog reads the record while a task occupies the thread of the run.
@@ -26,7 +26,7 @@ thread_local! {
     /// State of the run whose tasks this thread polls. `ManuallyDrop`, because a thread-local value that needs no drop is accessed without a check whether it
     /// was dropped. [`Stay`] takes the state away before the thread ends.
     static HERE: RefCell<ManuallyDrop<Option<Box<Core>>>> = const { RefCell::new(ManuallyDrop::new(None)) };
-    /// Number of the run whose state lies in `HERE` at the time of its clock; 0 if there is no such run.
+    /// Number of the run whose state lies in `HERE` at the time of the run's clock; 0 if there is no such run.
     static AT_HAND: Cell<u64> = const { Cell::new(0) };
 }
 
@@ -49,7 +49,7 @@ pub(crate) struct Shared {
     is_synced: AtomicBool,
     clock: Clock,
     face: Arc<Face>,
-    /// Pieces of work on other threads for which time waits.
+    /// Number of pieces of work on other threads during which time does not pass.
     #[cfg(feature = "facade")]
     pub(super) holds: Arc<std::sync::atomic::AtomicUsize>,
 }
@@ -87,7 +87,7 @@ impl Shared {
         }
     }
 
-    /// Returns whether the state lies with this thread, at the time of its clock. Until the executor goes on, only this thread changes the state.
+    /// Returns whether the state lies with this thread, at the time of the clock. Until the executor goes on, only this thread changes the state.
     #[inline]
     pub(crate) fn is_at_hand(&self) -> bool {
         AT_HAND.get() == self.run
@@ -103,7 +103,7 @@ impl Shared {
         &self.names
     }
 
-    /// Notes that the run is over and its tasks are dropped.
+    /// Notes that the run is over and all tasks are dropped.
     pub(crate) fn end(&self) {
         self.has_ended.store(true, Ordering::Release);
     }
@@ -140,6 +140,7 @@ impl Shared {
             self.asked_now();
         }
         self.is_synced.store(true, Ordering::Relaxed);
+        // A state that other threads read stays behind the lock and is never at hand.
         if !self.stays {
             AT_HAND.set(self.run);
         }
@@ -231,12 +232,14 @@ impl Shared {
     #[inline(never)]
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub(super) fn visit(&self) -> Visit<'_> {
+        // The state may lie here and not be at hand: then only tokio's clock may have moved since the last access.
         let is_here = HERE.with_borrow(|here| here.as_ref().is_some_and(|core| core.run == self.run));
         if !is_here && !self.may_be_had() {
             panic!("{}", self.note_misuse("a test bed"));
         }
         let mut visit = Visit { home: None, other: None };
         if !is_here {
+            // The lock of `home` is held during the whole visit, so that another thread waits until the state is back.
             let mut home = self.lock_home();
             visit.other = HERE.with_borrow_mut(|here| std::mem::replace(&mut **here, home.take()));
             visit.home = Some(home);
@@ -271,6 +274,7 @@ impl Shared {
         if !self.stays {
             let core = self.lock_home().take();
             HERE.with_borrow_mut(|here| **here = core);
+            // With tokio's clock the state is at hand only while a guard of `sync` exists.
             if matches!(self.clock, Clock::Own) {
                 AT_HAND.set(self.run);
             }
@@ -297,6 +301,7 @@ impl Drop for Visit<'_> {
     #[inline(never)]
     fn drop(&mut self) {
         if let Some(home) = &mut self.home {
+            // The state goes home, and the state that lay here before the visit comes back.
             **home = HERE.with_borrow_mut(|here| std::mem::replace(&mut **here, self.other.take()));
         }
     }

@@ -55,7 +55,7 @@ pub(crate) struct SocketState {
     /// `true` if IP has refused a sent datagram, and the program has not been told.
     pub(super) refused: bool,
     pub(super) may_broadcast: bool,
-    /// Instant at which the host crashed or its program was killed; `None` while the socket lives.
+    /// Instant at which the host crashed or the program of the host was killed; `None` while the socket lives.
     pub(super) died: Option<Instant>,
 }
 
@@ -66,6 +66,7 @@ impl SocketState {
         let (len, is_six) = (parcel.bytes.len(), parcel.addresses.is_six);
         parcel.addresses.is_mapped = self.port.is_six() && !is_six;
         let memory = self.memory + memory_of(len, is_six);
+        // An empty buffer takes a datagram of any length: otherwise a program with a small buffer would never receive a long datagram.
         if memory > self.room && self.memory > 0 {
             return Err(Lost::BufferFull);
         }
@@ -117,18 +118,20 @@ impl SocketState {
         std::iter::once(self.port).chain(self.is_dual().then(|| Port::new(false, self.port.number())))
     }
 
-    /// Returns an address of a packet as the program sees it.
+    /// Returns an address of a packet in the form for the program.
     pub(super) fn shown(&self, address: SocketAddr) -> SocketAddr {
         if self.port.is_six() { mapped(address) } else { address }
     }
 
-    /// Returns the address of the other end of a packet of this socket: of IPv4 for `::ffff:10.0.0.1`, which a socket of IPv6 reaches over IPv4.
+    /// Returns the address of the other end of a packet of this socket. A mapped address such as `::ffff:10.0.0.1` becomes an address of IPv4, because packets
+    /// to such an address travel over IPv4.
     ///
     /// # Errors
     ///
-    /// If the socket cannot send packets of that version of IP.
+    /// If the socket cannot send packets of the version of IP of `to`.
     #[inline]
     pub(super) fn wire_form(&self, to: SocketAddr) -> io::Result<SocketAddr> {
+        // The common case, kept short: an address of IPv4 for a socket of IPv4 needs no conversion.
         if to.is_ipv6() == self.port.is_six() && !to.is_ipv6() {
             return Ok(to);
         }

@@ -16,7 +16,7 @@ use crate::address::Addresses;
 use crate::errno::Errno;
 use crate::wire::{Held, Where};
 
-/// All sockets that have not been closed.
+/// Sockets that have not been closed.
 #[derive(Debug, Default)]
 pub(super) struct Sockets {
     /// State of each socket, indexed by [`SocketId`]; `None` at free indices. Boxed, so that an index becomes an address by a shift.
@@ -68,6 +68,7 @@ impl Core {
         let state =
             SocketState { host, at, port, peer: None, room, inbox, held: 0, memory: 0, readers, refused: false, may_broadcast: false, died: None };
         let bound = &mut self.hosts[host.index()].bound;
+        // A dual socket is entered under both versions of IP, so that a packet of either version finds the socket by its port.
         let versions = state.versions();
         let id = self.sockets.insert(state);
         versions.for_each(|port| bound.add(port, id));
@@ -102,15 +103,16 @@ impl Core {
         Err(io::Error::new(io::ErrorKind::AddrInUse, text))
     }
 
-    /// Closes the socket. Its port is free afterwards.
+    /// Closes the socket, and frees the port of the socket.
     pub(crate) fn close(&mut self, id: SocketId) {
         let Some(mut state) = self.sockets.places[id.0].take() else { return };
         state.clear(&mut self.wire.held);
         self.sockets.free.push(id.0);
+        // After a crash the host has forgotten its sockets, and the removal does nothing.
         state.versions().for_each(|port| self.hosts[state.host.index()].bound.remove(port, id));
     }
 
-    /// Checks that the socket lives. A socket dies when its host crashes, or when the program of its host is killed.
+    /// Checks that the socket lives. A socket dies when its host crashes, or when the program of the host is killed.
     #[inline]
     pub(crate) fn check_alive(&self, id: SocketId) -> io::Result<()> {
         let socket = self.sockets.get(id);
@@ -146,12 +148,13 @@ impl Core {
         socket.peer.map(|peer| socket.shown(peer))
     }
 
-    /// Connects the socket, which from now on receives datagrams of `peer` only. As with Linux, datagrams already in the buffer stay, and a peer to which no
-    /// datagram could be sent is refused.
+    /// Connects the socket, which from now on receives datagrams of `peer` only. As with Linux, datagrams already in the buffer stay, and an unreachable peer
+    /// is refused.
     pub(crate) fn connect(&mut self, id: SocketId, peer: SocketAddr) -> io::Result<()> {
         self.check_alive(id)?;
         let socket = self.sockets.get(id);
         let to = socket.wire_form(peer)?;
+        // The route is asked for its errors: a peer to which no datagram could be sent is refused here, and not at the first send.
         let route = self.route(socket, &to)?;
         // As with Linux, the unspecified address stands for loopback. Datagrams of the peer come from there.
         let ip = if to.ip().is_unspecified() { Addresses::long(route.to, to.is_ipv6()) } else { to.ip() };
@@ -164,7 +167,7 @@ impl Core {
         &mut self.sockets.get_mut(id).room
     }
 
-    /// Returns a line for each socket that a task waits for.
+    /// Returns a line for each socket for which a task waits.
     pub(crate) fn waits(&self) -> Vec<String> {
         let waiting = self.sockets.places.iter().flatten().filter(|socket| !socket.readers.is_empty());
         let lines = waiting.map(|socket| format!("host `{}`: UDP {} waits for a datagram", self.plan.names()[socket.host.index()], socket.local()));
@@ -203,6 +206,7 @@ impl Core {
         if socket.has_error() {
             return Poll::Ready(Err(self.error_of(id)));
         }
+        // A peek without a datagram falls through to the wait below, where the empty inbox has nothing to pop.
         if PEEK && let Some(datagram) = socket.inbox.front() {
             return Poll::Ready(Ok(look(datagram)));
         }
@@ -216,6 +220,7 @@ impl Core {
         socket.held -= len;
         socket.memory -= memory_of(len, datagram.addresses.is_six);
         self.wire.held.remove(Where::Buffers, Held::cost(len));
+        // `look` returns no reference into the datagram, so the memory of the datagram is used again at once.
         let seen = look(&datagram);
         self.spare.put(datagram);
         Poll::Ready(Ok(seen))

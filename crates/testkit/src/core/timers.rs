@@ -8,12 +8,12 @@ use cohaptic_units::Instant;
 use super::waking::Woken;
 use crate::wire::earlier;
 
-/// Deadline of a timer, and its number, which orders timers of equal deadlines.
+/// Deadline and number of a timer. The number orders timers of equal deadlines.
 pub(crate) type TimerId = (Instant, u64);
 
 /// All timers of a run.
 ///
-/// Most timers are set in the order in which they go off, or nearly so: many programs wait for the same span, and another task waits for all these programs.
+/// Most timers are set in the order of their deadlines, or nearly so: many programs wait for the same span, and another task waits for all these programs.
 /// Such timers lie in a queue, where setting and firing take a few steps. Only timers set far out of order lie in a tree.
 #[derive(Debug, Default)]
 pub(crate) struct Timers {
@@ -63,6 +63,7 @@ impl Timers {
             self.others.remove(&id);
             return;
         };
+        // The entry only loses its waker. A removal from the middle of the queue would move all entries after it.
         if self.ordered[place].1.take().is_some() {
             self.cancelled += 1;
             self.clean();
@@ -70,6 +71,7 @@ impl Timers {
     }
 
     fn place(&self, id: TimerId) -> Option<usize> {
+        // The queue is sorted by deadline and number, and no two timers have the same number.
         self.ordered.binary_search_by_key(&id, |(id, _)| *id).ok()
     }
 
@@ -98,6 +100,7 @@ impl Timers {
 
     /// Returns the earliest deadline for which the task with the waker `waker` waits.
     pub(super) fn deadline_of(&self, waker: &Waker) -> Option<Instant> {
+        // A search through all timers is slow, but only messages about waiting tasks need the answer.
         let is_of = |other: Option<&Waker>| other.is_some_and(|other| other.will_wake(waker));
         let ordered = self.ordered.iter().find(|(_, other)| is_of(other.as_ref())).map(|((deadline, _), _)| *deadline);
         let other = self.others.iter().find(|(_, other)| is_of(Some(other))).map(|((deadline, _), _)| *deadline);
@@ -116,6 +119,7 @@ impl Timers {
     fn fire_first(&mut self, woken: &mut Woken) {
         let first_other = self.others.first_entry();
         if let Some(other) = first_other
+            // Both collections are sorted, so the smaller of the two first keys belongs to the timer that goes off first.
             && self.ordered.front().is_none_or(|(id, _)| other.key() < id)
         {
             return woken.wake(other.remove());

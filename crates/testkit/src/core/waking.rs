@@ -1,4 +1,4 @@
-//! Tasks that wait, and the order and time of their waking.
+//! Waiting tasks, and the order and time of their waking.
 
 use std::task::{RawWakerVTable, Waker};
 
@@ -24,6 +24,7 @@ impl Waiters {
     /// Adds a waiting task. A task that waits already is not added twice.
     #[inline]
     pub(super) fn wait(&mut self, waker: &Waker) {
+        // Most sockets have one reader, and the waker of its last wait is still there.
         if self.first.as_ref().is_some_and(|first| first.will_wake(waker)) {
             self.first_waits = true;
             return;
@@ -98,6 +99,7 @@ impl Woken {
     /// Calls the waker now if it is trusted, otherwise after the borrow.
     #[inline]
     pub(super) fn wake_by_ref(&mut self, waker: &Waker) {
+        // All wakers of one kind share a table, so the address of the table tells the kind.
         if self.own.is_some_and(|own| std::ptr::eq(own, waker.vtable())) {
             waker.wake_by_ref();
         } else {
@@ -128,6 +130,7 @@ impl Woken {
     /// Takes the wakers to call after the borrow, or returns `None` if there are none.
     #[inline]
     pub(super) fn take(&mut self) -> Option<Vec<Waker>> {
+        // Most borrows wake no foreign task, and cost only this check.
         (!self.later.is_empty()).then(|| std::mem::take(&mut self.later))
     }
 }

@@ -1,7 +1,7 @@
 //! The test bed of the present thread for a package `tokio` that stands in for tokio: implements the traits of `cohaptic-sockets`.
 //!
-//! `cohaptic tokio` generates that package. Programs that use tokio's sockets and tasks then run on a test bed unchanged: the package asks `cohaptic-sockets`
-//! for the test bed of the thread, which `crate::runtime` registers for each run.
+//! `cohaptic tokio` writes the package. Programs with tokio's sockets and tasks then run on a test bed unchanged: the package asks `cohaptic-sockets` for the
+//! test bed of the thread, and `crate::runtime` registers the test bed of each run.
 
 mod settings;
 mod unix;
@@ -23,10 +23,10 @@ use crate::task::{Kept, OtherTasks};
 use crate::tcp::socket::TcpSocket;
 use crate::tcp::{TcpListener, TcpStream};
 
-/// Advice for a task without a host. The `tokio` of the program is the package that stands in, and the task was started outside of all hosts.
+/// Advice for a task without a host. The program uses the package in place of tokio, and the task was started outside of all hosts.
 const HOW: &str = "wrap the call, or the task that `tokio::spawn` started on no host, in `Host::scope`";
 
-/// A run, as `cohaptic-sockets` sees it.
+/// A run in the form for `cohaptic-sockets`.
 pub(crate) struct BedOfThread {
     pub(crate) shared: Arc<Shared>,
     pub(crate) others: Arc<OtherTasks>,

@@ -1,4 +1,4 @@
-//! Options that programs set on placeholders of sockets: see [`cohaptic_sockets::Setting`].
+//! Options set by programs on placeholders of sockets: see [`cohaptic_sockets::Setting`].
 
 use std::io;
 
@@ -68,7 +68,7 @@ impl Configured for TcpListener {
             .collect())
     }
 
-    /// Sets an option, which the connections that are accepted from now on inherit.
+    /// Sets an option for the connections accepted from now on.
     fn set(&self, setting: Setting) -> io::Result<()> {
         self.inherited(|config, linger| match setting {
             Setting::NoDelay(on) => config.nodelay = on,
@@ -94,6 +94,7 @@ impl Configured for UdpSocket {
 
     fn set(&self, setting: Setting) -> io::Result<()> {
         match setting {
+            // A setting holds the doubled size, as read from the placeholder, and the socket doubles the size again.
             Setting::ReceiveBuffer(bytes) => self.set_recv_buffer_size(bytes / 2),
             Setting::SendBuffer(bytes) => self.set_send_buffer_size(bytes / 2),
             Setting::TypeOfService(value) => self.set_tos_v4(value),

@@ -1,4 +1,4 @@
-//! Unix sockets and pipes of hosts, which the state of the run holds.
+//! Unix sockets and pipes of hosts, as handles to the state of the run.
 
 use std::fmt;
 use std::io::{self, IoSlice, IoSliceMut};
@@ -14,12 +14,12 @@ use crate::core::{Core, Shared, UnixId};
 /// Name of the sockets in errors.
 const KIND: &str = "a Unix socket or a pipe";
 
-/// Makes something on a host that is up.
+/// Makes a socket or a pipe on a host that is up.
 pub(super) fn open<T>(shared: &Shared, host: NodeId, make: impl FnOnce(&mut Core) -> T) -> io::Result<T> {
     shared.open(host, KIND, |core| core.check_up(host).map(|()| make(core)))?
 }
 
-/// Defines a handle of something that the state of the run holds until the handle is dropped.
+/// Defines the handle of a socket in the state of the run. Dropping the handle removes the socket.
 macro_rules! handle {
     ($(#[$documentation:meta])* $name:ident, $drop:ident) => {
         $(#[$documentation])*
@@ -96,7 +96,7 @@ impl ByteStream for Stream {
         self.poll(cx, Core::wait_to_write_unix, |core, id| core.write_unix(id, buffers))
     }
 
-    /// Each attempt counts, so that a task is noticed that tries again and again at an instant.
+    /// Reads without waiting. Each attempt counts, so that the run notices a task that tries again and again at an instant.
     fn try_read(&self, buffers: &mut [IoSliceMut<'_>]) -> io::Result<usize> {
         self.shared.note_call();
         self.ask(|core| core.read_unix(self.id, buffers))
@@ -123,7 +123,7 @@ impl ByteStream for Stream {
 }
 
 impl Stream {
-    /// Tries `act`, and registers the waker of the context by `wait` if that would block.
+    /// Tries `act`, and registers the waker of the context by `wait` if `act` would block.
     fn poll<T>(
         &self,
         cx: &Context<'_>,
@@ -191,7 +191,7 @@ impl UnixListener for Listener {
 }
 
 impl Datagrams {
-    /// Counts a call that does not wait, so that a task is noticed that tries again and again at an instant.
+    /// Counts a call that does not wait, so that the run notices a task that tries again and again at an instant.
     fn note_attempt(&self, waker: Option<&Waker>) {
         if waker.is_none() {
             self.shared.note_call();

@@ -1,5 +1,5 @@
-//! Hook of panics. The panics of a property that is being shrunk are kept back, and a panic of tokio that comes from the test bed is told in the words of the
-//! test kit: the advice of tokio cannot be followed in a test bed, which makes the runtime.
+//! Hook of panics. Panics of a property are kept back during shrinking. A panic of tokio caused by the test bed gets a message of the test kit, because nobody
+//! can follow the advice of tokio in a test bed: the test bed makes the runtime.
 
 use std::any::Any;
 use std::panic::{self, PanicHookInfo};
@@ -28,7 +28,7 @@ pub(super) fn better(payload: &dyn Any) -> Option<&'static str> {
     [NO_RUNTIME, NO_SOCKETS].into_iter().find(|(part, _)| text.contains(part)).map(|(_, better)| better)
 }
 
-/// Returns the payload with which a run fails that has panicked with `payload`.
+/// Returns the payload of the failure of a run that panicked with `payload`.
 pub(crate) fn told(payload: Box<dyn Any + Send>) -> Box<dyn Any + Send> {
     match better(&*payload) {
         Some(text) => Box::new(text.to_owned()),

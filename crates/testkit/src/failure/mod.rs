@@ -44,7 +44,7 @@ fn print(before: &str, lines: Lines) {
 #[inline(never)]
 pub(crate) fn __rust_begin_short_backtrace<T>(act: impl FnOnce() -> T) -> T {
     let outcome = act();
-    // Without this the compiler might turn the call into a jump, and the name would be missing in the backtrace.
+    // Without the black box the compiler might turn the call into a jump, and the name would be missing in the backtrace.
     std::hint::black_box(());
     outcome
 }

@@ -98,6 +98,7 @@ impl Drop for Searching {
     fn drop(&mut self) {
         let left = SEARCHES.get() - 1;
         SEARCHES.set(left);
+        // Clones of a value count as well. The last value gone means that the search is over.
         if left == 0 {
             let kept = KEPT.replace(Kept::NOTHING);
             // If nothing shrinks, a panic after the run is the only sign of the failure.

@@ -1,4 +1,4 @@
-//! Hosts and links from a file that a test can keep.
+//! Hosts and links from a file beside a test.
 
 #[cfg(feature = "files")]
 mod documents;
@@ -37,10 +37,10 @@ use crate::words;
 /// hit client -> server: drop 2nd packet
 /// ```
 ///
-/// After the colon follow words of `tc-netem`, which are emulated exactly, or nothing, which is the ideal link, or `replay` and the file of a fate log,
-/// relative to the link file, or, with the feature `files`, the name of a link of the library such as `starlink/up`. `all` stands for every link that no
-/// other line names; without `all` such links are ideal. Without `hosts` the hosts are those named by lines, in the order of the lines. `hit` and a path tell
-/// which packets of the path are [hit](crate::hit).
+/// After the colon follow words of `tc-netem` for an exact emulation, or nothing for the ideal link, or `replay` and the file of a fate log, relative to the
+/// link file, or, with the feature `files`, the name of a link of the library such as `starlink/up`. `all` stands for every link without a line of its own;
+/// without `all` such links are ideal. Without `hosts` the lines name the hosts, in the order of the lines. `hit` and a path hit [packets](crate::hit) of the
+/// path.
 ///
 /// Relative paths begin in the folder in which the test runs; under `cargo test` this is the folder of the package.
 #[derive(Clone, PartialEq, Debug)]
@@ -85,7 +85,7 @@ pub enum LinkFileError {
     /// The file makes no sense as a scene file or a relay file.
     #[cfg(feature = "files")]
     Document(cohaptic_linkfile::FileError),
-    /// The scene contains something that links between hosts cannot represent.
+    /// The scene has a part that links between hosts cannot represent.
     NotLinks {
         /// The file.
         path: PathBuf,

@@ -11,7 +11,7 @@ use super::{LinkFile, LinkFileError};
 use crate::access::AccessLines;
 use crate::link::LinkChange;
 
-/// Returns whether a text is a relay file. A text that is no TOML counts as a scene file, whose parser then reports the place of the error.
+/// Returns whether a text is a relay file. A text that is no TOML counts as a scene file, because the parser of scenes reports the place of the error.
 pub(super) fn is_relay(text: &str) -> bool {
     text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("programs") || table.contains_key("relay"))
 }
@@ -47,11 +47,12 @@ impl LinkFile {
             let at = change.at;
             match change.what {
                 ChangeKind::Link(link) => changes.push(LinkChange { at, from: link.from, to: link.to, link: Arc::unwrap_or_clone(link.config) }),
+                // A test bed changes links one by one, so one change becomes a change of every pair.
                 ChangeKind::AllLinks(table) => changes.extend(pairs(table.peers()).map(|(from, to)| {
                     let link = table.between(from, to).clone();
                     LinkChange { at, from, to, link }
                 })),
-                // These changes concern the ends of the links, which a test bed does not have.
+                // These changes concern the peers at the ends of the links. A test bed has programs there.
                 ChangeKind::Contact { .. }
                 | ChangeKind::Hand { .. }
                 | ChangeKind::HandTorque { .. }

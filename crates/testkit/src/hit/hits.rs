@@ -4,8 +4,8 @@ use std::fmt;
 
 use super::words::Hit;
 
-/// Hits on packets between hosts, which are named. [`Testbed::hits`](crate::Testbed::hits) takes such a value, and `strategies::any_hits` draws one (feature
-/// `strategies`).
+/// Hits on packets between hosts, with the names of the hosts. [`Testbed::hits`](crate::Testbed::hits) takes such a value, and `strategies::any_hits` draws
+/// such values (feature `strategies`).
 ///
 /// The text form has a line per path, with [words](crate::hit) after a colon. `Debug` prints Rust code that makes the same value.
 ///
@@ -62,6 +62,7 @@ impl Hits {
 
 impl fmt::Display for Hits {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Hits of a path that follow each other share a line, so that a value from `any_hits` has one line per path.
         let mut before: Option<&PathHit> = None;
         for hit in &self.all {
             match before {

@@ -9,7 +9,7 @@ use super::{PacketLaw, SentPacket, Verdict};
 #[derive(Clone, Debug)]
 pub(crate) struct WordsLaw {
     hit: Hit,
-    /// Number of packets so far that are of the kind of the hit.
+    /// Number of packets so far of the kind of the hit.
     met: u64,
 }
 
@@ -42,6 +42,7 @@ impl PacketLaw for WordsLaw {
             Action::Drop => Verdict::Drop,
             Action::Delay(time) => Verdict::Delay(time),
             Action::Duplicate(time) => Verdict::Duplicate(time),
+            // Any number will do: the bit is taken modulo the number of bits of the packet.
             Action::Corrupt => Verdict::Corrupt(draws.next_word()),
             Action::Behind(count) => Verdict::Behind(count),
         }

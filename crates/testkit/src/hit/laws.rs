@@ -17,7 +17,7 @@ pub(crate) struct Laws(Vec<Given>);
 #[derive(Clone)]
 pub(crate) struct Given {
     pub(crate) path: Path,
-    /// Words of the law, or the place where the test gave it.
+    /// Words of the law, or the place where the test gave the law.
     pub(crate) name: String,
     /// Hit, if the law was given in words.
     hit: Option<Hit>,
@@ -28,6 +28,7 @@ type Fresh = dyn Fn() -> Box<dyn PacketLaw + Send> + Send + Sync + UnwindSafe + 
 
 impl Laws {
     pub(crate) fn add(&mut self, path: Path, name: String, law: impl PacketLaw + Clone + Send + 'static) {
+        // A law need not be `Sync`. The mutex permits clones of a test bed on several threads.
         let law = Mutex::new(law);
         self.0.push(Given { path, name, hit: None, fresh: Arc::new(move || Box::new(lock(&law).clone())) });
     }

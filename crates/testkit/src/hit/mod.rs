@@ -1,4 +1,4 @@
-//! Hits on single packets: which packets are hit, and the fate of each.
+//! Hits on single packets: the choice of packets, and their fates.
 //!
 //! A law is asked about every packet that is offered to a link, and returns a [`Verdict`]. A law is a closure
 //! ([`Testbed::on_packet`](crate::Testbed::on_packet)), words ([`Testbed::hit`](crate::Testbed::hit), lines of [link files](crate::LinkFile)), or an
@@ -129,7 +129,7 @@ pub enum Verdict {
 pub trait PacketLaw {
     /// Returns the fate of a packet.
     ///
-    /// `draws` are random numbers of this packet and this law. They depend on the seed, the path, the number of the packet, and the index of the law among the
-    /// laws of the path only, so draws for other packets do not change them.
+    /// `draws` are random numbers of this packet and this law. The numbers depend on the seed, the path, the number of the packet, and the index of the law
+    /// among the laws of the path only, so draws for other packets change nothing here.
     fn judge(&mut self, packet: &SentPacket<'_>, draws: &mut Draws) -> Verdict;
 }

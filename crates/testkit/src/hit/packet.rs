@@ -1,11 +1,11 @@
-//! Packet as laws see it.
+//! Packet in the form for laws.
 
 #[cfg(feature = "tcp")]
 use cohaptic_tcp::Segment;
 use cohaptic_units::Instant;
 use cohaptic_wan::Path;
 
-/// Packet that is offered to its link.
+/// Packet at the moment of the offer to its link.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct SentPacket<'a> {
@@ -21,7 +21,7 @@ pub struct SentPacket<'a> {
     pub at: Instant,
     /// Content of the packet: for a datagram the payload without headers, for TCP the whole IP packet.
     pub bytes: &'a [u8],
-    /// Whether the packet was sent before: a segment of TCP some of whose sequence numbers were sent before, or another packet with the same bytes as an
+    /// `true` if the packet was sent before: a segment of TCP with a sequence number that was sent before, or another packet with the same bytes as an
     /// earlier packet of this path.
     pub is_retransmission: bool,
     #[cfg(feature = "tcp")]

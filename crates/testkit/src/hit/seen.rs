@@ -1,4 +1,4 @@
-//! Memory of the packets of a path, by which retransmissions are recognised.
+//! Memory of the packets of a path, for recognising retransmissions.
 
 #[cfg(feature = "tcp")]
 use std::collections::BTreeMap;
@@ -14,15 +14,15 @@ use crate::seed::hash;
 /// Packets of a path so far.
 #[derive(Debug, Default)]
 pub(crate) struct Seen {
-    /// First sequence number that was never sent, by source and destination.
+    /// First sequence number not sent so far, by source and destination.
     #[cfg(feature = "tcp")]
     next: BTreeMap<(SocketAddr, SocketAddr), u32>,
-    /// Digests of the packets that are not of TCP.
+    /// Digests of the packets of other protocols than TCP.
     digests: BTreeSet<u64>,
 }
 
 impl Seen {
-    /// Notes a packet that is not of TCP. Returns whether a packet with the same bytes was sent before.
+    /// Notes a packet of another protocol than TCP. Returns whether a packet with the same bytes was sent before.
     pub(crate) fn note(&mut self, bytes: &[u8]) -> bool {
         !self.digests.insert(hash(bytes))
     }
@@ -31,6 +31,7 @@ impl Seen {
     #[cfg(feature = "tcp")]
     pub(crate) fn note_segment(&mut self, segment: &Segment<'_>) -> bool {
         let length = segment.sequence_length();
+        // A mere acknowledgement uses no sequence number, and many in a row may be equal without being retransmissions.
         if length == 0 {
             return false;
         }

@@ -53,6 +53,7 @@ impl NodeRun {
     pub fn set_link(&mut self, from: &str, to: &str, link: impl ToLink) {
         let path = self.names.path(from, to);
         assert!(path.from != path.to, "node `{from}` has no link to itself");
+        // Packets of touched nodes are sent over the old link, because the test touched the nodes before this call.
         self.ask_touched();
         self.wire.set_link(self.now(), path, link.to_link());
         self.take_arrivals();
@@ -68,6 +69,7 @@ impl NodeRun {
         // The type is checked first, so that a node of another type stays in the run.
         let _: &T = self.node(name);
         let id = self.id(name);
+        // Packets that the test has given to the node leave before the crash.
         self.ask_touched();
         self.up[id.index()] = false;
         self.deadlines.set(id.index(), None);
@@ -114,6 +116,7 @@ impl NodeRun {
 
     fn set_cut(&mut self, from: &str, to: &str, cut: bool) {
         let path = self.names.path(from, to);
+        // Packets of touched nodes are sent before the cut or its end, in the order of the calls of the test.
         self.ask_touched();
         self.wire.set_cut(path, cut);
     }

@@ -112,7 +112,7 @@ impl Packet {
 pub struct Transmit {
     /// Receiver: see [`address()`]. A packet to an address that no node has is [counted](NodeCounts::unroutable), and lost.
     pub to: SocketAddr,
-    /// Port from which the packet is sent. The receiver sees the port, which has no other effect.
+    /// Port from which the packet is sent. The receiver sees the port; the port has no further effect.
     pub from_port: u16,
     /// Content of the packet.
     pub bytes: Bytes,

@@ -16,6 +16,7 @@ impl NodeRun {
         if self.wire.set_now(at) {
             self.done = 0;
         }
+        // Packets that leave a link up to a change are delivered before the next change.
         while self.wire.change_next() {
             self.take_arrivals();
         }
@@ -25,8 +26,8 @@ impl NodeRun {
         }
         let mut from = 0;
         while let Some(due) = self.deadlines.due(from, self.now()) {
-            // The search goes on after the woken node: a node that wants to be woken again at this instant waits for the next step, and cannot keep others from
-            // theirs.
+            // The search goes on after the woken node. A node that wants to be woken again at this instant waits for the next step, so every other due node
+            // gets a turn.
             from = due + 1;
             let (id, now) = (NodeId::new(due), self.now());
             self.count(Does::Wakes, id);
@@ -37,6 +38,7 @@ impl NodeRun {
             }
             self.ask(id, Does::Wakes);
         }
+        // Packets that the woken nodes sent over links without delay arrive at this instant too.
         self.hand_over();
     }
 
@@ -122,6 +124,7 @@ impl NodeRun {
 
     /// Hands arrived packets over, in the order of arrival, with packets that arrive at once as a consequence.
     pub(super) fn hand_over(&mut self) {
+        // Over links without delay `ask` appends packets to `arrived`. The loop hands these packets over at the same instant.
         while let Some((to, packet)) = self.arrived.pop_front() {
             self.wire.held.remove(Where::Buffers, Held::cost(packet.bytes.len()));
             self.count(Does::Receives, to);

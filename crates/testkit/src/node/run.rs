@@ -26,7 +26,7 @@ use crate::wire::{HasFlow, Wire};
 
 /// Running nodes.
 ///
-/// Between the steps of time the test looks at the nodes, changes the nodes, and breaks the links between them. At one instant packets arrive first, in the
+/// Between the steps of time the test looks at the nodes, changes the nodes, and breaks links between nodes. At one instant packets arrive first, in the
 /// order of the [network](cohaptic_wan::Network). Then the timers that are due go off, in the order of the nodes. Then packets arrive that are sent at this
 /// instant over links without delay. If the test fails while the run exists, the seed is printed, and the record is written where
 /// [`Nodes::artefacts`](super::Nodes::artefacts) says.
@@ -40,7 +40,7 @@ pub struct NodeRun {
     pub(super) counts: Vec<NodeCounts>,
     /// Packets that have arrived and are not handed over yet, with the receiver.
     pub(super) arrived: VecDeque<(NodeId, Packet)>,
-    /// Nodes that the test has changed, and whose packets and deadlines must be polled again.
+    /// Nodes changed by the test. Their packets and deadlines must be polled again.
     touched: Vec<NodeId>,
     /// Number of events since time last passed.
     pub(super) done: u64,
@@ -70,12 +70,13 @@ pub(super) struct Ports {
 
 impl HasFlow for Ports {
     fn flow(&self, Path { from, to }: Path) -> u32 {
+        // Two hosts and two ports of 16 bits each fill the 64 bits of `ends`.
         let ends = [from.0, to.0, self.from, self.to].into_iter().fold(0, |ends, part| ends << 16 | u64::from(part));
         flow_number(&[ends, self.is_six.into()])
     }
 }
 
-/// Counts of the packets and timers of a node.
+/// Number of packets and timers of a node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[non_exhaustive]
 pub struct NodeCounts {
@@ -85,7 +86,7 @@ pub struct NodeCounts {
     pub arrived: u64,
     /// Timers that went off.
     pub timeouts: u64,
-    /// Packets that the node has sent to an address that no node has.
+    /// Packets from the node to an address of no node.
     pub unroutable: u64,
     /// Packets that were lost because the node was down when they arrived.
     pub while_down: u64,
@@ -96,6 +97,7 @@ pub struct NodeCounts {
 impl NodeRun {
     pub(super) fn new(mut setup: Setup, nodes: Vec<Box<dyn Node>>, seed: Seed) -> Self {
         let artefacts = Artefacts::new(setup.artefacts.take(), &seed);
+        // The folder may come from the environment, without a word in the test.
         if artefacts.is_wanted() {
             setup.record();
         }
@@ -110,6 +112,7 @@ impl NodeRun {
             deadlines: Deadlines::new(count),
             counts: vec![NodeCounts::default(); count],
             arrived: VecDeque::new(),
+            // Every node counts as touched, so that `ask_touched` below asks each node for its first packets and deadline.
             touched: (0..count).map(NodeId::new).collect(),
             done: 0,
             patience: settings.patience,
@@ -149,6 +152,7 @@ impl NodeRun {
     #[must_use]
     pub fn node_mut<T: Node>(&mut self, name: &str) -> &mut T {
         let id = self.id(name);
+        // Noted before the node is lent, because the run does not learn when the test has finished its changes.
         self.touched.push(id);
         let node: &mut dyn Any = self.nodes[id.index()].as_deref_mut().unwrap_or_else(|| is_down(name));
         node.downcast_mut().unwrap_or_else(|| is_another::<T>(name))
@@ -220,6 +224,7 @@ impl NodeRun {
         while let Some(next) = self.next().filter(|next| *next <= until) {
             self.pass(next);
         }
+        // The last event may lie before `until`, so the time is still to be moved.
         self.wire.set_now(until);
     }
 
@@ -298,6 +303,7 @@ impl NodeRun {
         for node in std::mem::take(&mut self.touched) {
             self.ask(node, Does::Sends);
         }
+        // Packets over links without delay arrive before the test goes on.
         self.hand_over();
     }
 
@@ -326,6 +332,7 @@ pub(super) fn is_another<T>(name: &str) -> ! {
 
 impl Drop for NodeRun {
     fn drop(&mut self) {
+        // A run that is dropped without a panic has nothing to report.
         if std::thread::panicking() {
             let mut recorded = self.wire.recorded();
             let drawn = std::mem::take(&mut recorded.drawn);

@@ -96,8 +96,8 @@ pub fn tls_server_config() -> TlsServer {
         .expect("the key is the certificate's")
 }
 
-/// Returns the TLS configuration of [`client_config`]. It resumes no session: in a program that runs twice, the second run must not begin with sessions of the
-/// first.
+/// Returns the TLS configuration of [`client_config`]. The configuration resumes no session: in a program that runs twice, the second run must not begin with
+/// sessions of the first run.
 #[must_use]
 #[expect(clippy::missing_panics_doc, reason = "only constants are unwrapped")]
 pub fn tls_client_config() -> TlsClient {

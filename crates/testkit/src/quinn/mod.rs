@@ -1,7 +1,7 @@
 //! QUIC over emulated links: unmodified endpoints of [quinn](https://docs.rs/quinn) in virtual time.
 //!
-//! An [`endpoint`] has a virtual socket in place of a real one, and a runtime whose clock is that of the test bed. Handshake, loss recovery, congestion control
-//! and migration are those of quinn.
+//! An [`endpoint`] has a virtual socket in place of a real socket, and a runtime with the clock of the test bed. Handshake, loss recovery, congestion control
+//! and migration are quinn's own.
 //!
 //! ```
 //! use cohaptic_testkit::{Testbed, quinn};
@@ -42,13 +42,14 @@
 //! With other configurations lengths and times are still equal in two runs, provided that the key of the certificate gives signatures of fixed length (Ed25519
 //! or RSA; ECDSA signatures vary by some bytes). The bytes are not equal then: call [`Testbed::without_digests`](crate::Testbed::without_digests), or use the
 //! parts: [`crypto_provider`] and [`TestTime`] fit into any configuration of rustls. On links that damage packets, times also depend on the bytes, because the
-//! meaning of a damaged header does. Make configurations inside the program: the configuration of a client remembers the servers that it has met.
+//! meaning of a damaged header depends on the bytes. Make configurations inside the program: the configuration of a client remembers the servers of earlier
+//! connections.
 //!
 //! # Which clocks are read
 //!
 //! Quinn asks its runtime for the time, and the time source of its server for the time of tokens. Both are virtual, and so is the time provider of the TLS
 //! configurations of this module. Other clocks are read only by features that are not built here (`qlog`, `lock_tracking`), and by rustls outside of these
-//! configurations: there the validity of certificates is checked against the date of today, and `Ticketer`s change their keys by it. None of these clocks
+//! configurations: there the validity of certificates is checked against the date of today, and `Ticketer`s change their keys by the date. No such clock
 //! influences when a packet is sent.
 //!
 //! # What differs from a real socket
@@ -59,7 +60,7 @@
 //! - A packet sent as ECT(1) arrives as ECT(0), because links distinguish only "capable" and "marked". Quinn sends ECT(0).
 //! - An endpoint at `[::]` receives over IPv6 only.
 //! - A run begins on the first of January 2027, as far as certificates and tokens are concerned.
-//! - When a host crashes, its endpoints end without a message to their peers, which notice by their timeouts. Spawn the tasks that use an endpoint on its host.
+//! - When a host crashes, its endpoints end without a message to their peers. The peers notice by timeouts. Spawn the tasks that use an endpoint on its host.
 
 mod certificate;
 mod config;

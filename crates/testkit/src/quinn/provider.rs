@@ -15,14 +15,14 @@ use crate::current;
 /// Length of a key of X25519, secret or public \[byte\].
 const KEY: usize = 32;
 
-/// Returns cryptography for [`rustls`](::quinn::rustls) that draws its random numbers from the running test bed. Handshakes have the same bytes in every run of
-/// the same seed. Whoever knows the seed can decrypt the connection, so use this in tests only.
+/// Returns cryptography for [`rustls`](::quinn::rustls) with random numbers from the running test bed. Handshakes have the same bytes in every run of the same
+/// seed. The seed is enough to decrypt a connection, so use this provider in tests only.
 #[must_use]
 pub fn crypto_provider() -> Arc<CryptoProvider> {
     Arc::new(CryptoProvider { kx_groups: vec![&Curve], secure_random: &FromTestbed, ..ring::default_provider() })
 }
 
-/// Source of random numbers of the test bed that runs on this thread.
+/// Source of random numbers of the running test bed of this thread.
 #[derive(Debug)]
 struct FromTestbed;
 

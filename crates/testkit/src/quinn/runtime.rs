@@ -38,7 +38,7 @@ impl Runtime for OnHost {
         Box::pin(Timer(Sleep::of(Arc::clone(&self.shared), from_std(at))))
     }
 
-    /// Spawns a task. An endpoint whose test bed or host is gone has no driver and spawns nothing, so this is called only while the test bed runs.
+    /// Spawns a task. Called only while the test bed runs: an endpoint without its test bed or host has no driver and spawns nothing.
     fn spawn(&self, future: Pin<Box<dyn Future<Output = ()> + Send>>) {
         let running = context::expect_running("an endpoint works");
         // A task that is started while its host crashes ends with the host.

@@ -16,7 +16,7 @@ const DAY: u64 = 1_798_761_600;
 /// Returns the instant that stands for [`Instant::ZERO`] on quinn's clock.
 ///
 /// An instant of the standard library can only be made from the clock. The choice has no visible effect: quinn takes differences of instants and compares
-/// instants, and all instants that it sees are sums of this instant and virtual time.
+/// instants, and all instants of quinn are sums of this instant and virtual time.
 #[expect(clippy::disallowed_methods, reason = "there is no other way to an `Instant`; only differences to it are used")]
 fn base() -> StdInstant {
     static BASE: OnceLock<StdInstant> = OnceLock::new();

@@ -15,7 +15,7 @@ pub(super) struct Entered {
     _registered: cohaptic_sockets::Entered,
 }
 
-/// Makes a test bed the one that runs on this thread.
+/// Makes a test bed the running test bed of this thread.
 ///
 /// # Panics
 ///

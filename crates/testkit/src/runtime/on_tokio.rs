@@ -4,16 +4,15 @@
 //! the clock must be moved by hand within a millisecond, and to a whole millisecond before tokio may jump:
 //!
 //! ```text
-//!   all wait ──► something due within this millisecond? ── yes ─► advance to it
+//!   all wait ──► event due within this millisecond? ── yes ─► advance to the event
 //!                        │ no
-//!                within a millisecond (1.3 ms)? ── yes ─► advance to the next whole one (2 ms): what tokio has for it goes off
+//!                clock within a millisecond (1.3 ms)? ── yes ─► advance to the next whole millisecond (2 ms), for the timers of tokio
 //!                        │ no
-//!                let tokio jump: a timer of ours stands at the millisecond in which the next event is
+//!                let tokio jump: the timer of the pump stands at the millisecond of the next event
 //! ```
 //!
-//! Tokio calls a hook before it parks its thread, which means that all tasks wait. The hook moves the clock from event to event, as long as none of the events
-//! wakes a task, so tokio does not park meanwhile. If tokio is to jump, the hook wakes a task of this module, the pump, which sets the timer to which tokio
-//! jumps.
+//! Tokio calls a hook before parking its thread, when all tasks wait. The hook moves the clock from event to event until an event wakes a task, so tokio does
+//! not park meanwhile. Before a jump of tokio, the hook wakes a task of this module, the pump. The pump sets the timer for the jump.
 
 use std::cell::RefCell;
 use std::future::{Future, poll_fn};
@@ -44,13 +43,13 @@ use crate::wire::Recorded;
 /// Unit of tokio's timers: a millisecond \[ns\].
 const TICK: u64 = 1_000_000;
 
-/// Distance of the timer that is set when there is no next event. If tokio jumps that far, nothing will ever happen.
+/// Distance of the timer for a run without a next event. If tokio jumps this far, nothing will ever happen.
 const NEVER: Duration = Duration::from_secs(365 * 24 * 3600);
 
-/// Value of an atomic instant that stands for no instant.
+/// Value of an atomic instant that stands for "no instant".
 const NO_INSTANT: u64 = u64::MAX;
 
-/// Maximum number of tasks polled before tokio goes on. Equal to the number that tokio polls of a `LocalSet`.
+/// Maximum number of tasks polled before tokio goes on. Equal to the number of tasks that tokio polls of a `LocalSet` in a row.
 const POLLS: u32 = 61;
 
 /// State shared by the hook and the pump.
@@ -59,16 +58,15 @@ struct Idle {
     armed: AtomicU64,
     /// `true` if the pump must set its timer anew.
     is_wanted: AtomicBool,
-    /// Reading at which the hook has left the clock \[ns\], if nothing that could move the clock runs between the hook and the executor; otherwise
-    /// [`NO_INSTANT`].
+    /// Reading at which the hook has left the clock \[ns\], if nothing between the hook and the executor can move the clock; otherwise [`NO_INSTANT`].
     moved: AtomicU64,
     /// Last instant of the run: its time limit.
     until: Instant,
-    /// Instant at which tokio last parked its thread \[ns\].
+    /// Instant of tokio's last parking \[ns\].
     parked: AtomicU64,
-    /// `true` if tokio is jumping to an instant at which nothing will ever have happened. Tokio's timers do not reach that far, so this takes several jumps.
+    /// `true` if tokio is jumping to the timer for a run without a next event. Tokio's timers do not reach as far as [`NEVER`], so tokio takes several jumps.
     is_idle: AtomicBool,
-    /// Wakes the pump and the executor, which share a task.
+    /// Wakes the pump and the executor. Both share a task.
     main: Mutex<Option<Waker>>,
 }
 
@@ -85,7 +83,7 @@ impl Idle {
         }
     }
 
-    /// Wakes the executor. It is polled next, because tokio polls the future of `block_on` before its tasks. `now` is the reading of the clock.
+    /// Wakes the executor. Tokio polls the executor next, because the future of `block_on` comes before tokio's tasks. `now` is the reading of the clock.
     fn wake(&self, now: Instant) {
         self.moved.store(now.as_nanos(), Ordering::Relaxed);
         if let Some(main) = &*self.main.lock().unwrap_or_else(PoisonError::into_inner) {
@@ -100,8 +98,8 @@ impl Idle {
         if now <= self.until {
             return false;
         }
-        // A jump this long without a next event is taken for a jump to the timer for "no event". The run is then reported as waiting for ever, not as beyond
-        // its limit.
+        // A jump this long without a next event is taken for a jump to the timer for "no event". The run then fails as waiting for ever, not as beyond its
+        // limit.
         if now.saturating_duration_since(Instant::from_nanos(parked)) > NEVER / 2 && core.next_event().is_none() {
             self.is_idle.store(true, Ordering::Relaxed);
         }
@@ -110,7 +108,7 @@ impl Idle {
 
     /// Called when tokio is about to park its thread, because all tasks wait.
     fn notice(&self, shared: &Shared) {
-        // Work on another thread takes no time. Its end wakes a task, and tokio parks again after that task.
+        // Work on another thread takes no time. The end of the work wakes a task, and tokio parks again after the poll of this task.
         #[cfg(feature = "facade")]
         if shared.is_held() {
             return;
@@ -128,7 +126,7 @@ impl Idle {
         }
         loop {
             let (now, next) = (core.now(), core.next_event());
-            // The event is due if tokio has jumped over it, or the clock was moved to it below.
+            // An event is due if tokio has jumped over the event, or the clock was moved to the event below.
             let is_due = next.is_some_and(|next| next <= now);
             if is_due {
                 core.pass(now);
@@ -138,6 +136,7 @@ impl Idle {
                 self.moved.store(core.now().as_nanos(), Ordering::Relaxed);
                 return None;
             }
+            // Foreign wakers are called after the borrow of the state has ended. The woken tasks run before tokio parks again.
             if core.woken.is_any() {
                 return None;
             }
@@ -152,6 +151,7 @@ impl Idle {
             }
             core.pass(to);
         }
+        // The timer stands at the right millisecond already, so tokio may jump without a poll of the pump.
         if self.armed.load(Ordering::Relaxed) == armed(core.next_event()) {
             return None;
         }
@@ -180,11 +180,11 @@ fn step(now: Instant, next: Option<Instant>) -> Option<Instant> {
     }
 }
 
-/// Hook that tokio calls before parking its thread. The hook acts while a run goes on.
+/// Hook for tokio, called before tokio parks its thread. The hook acts while a run goes on.
 #[derive(Default)]
 pub(crate) struct Hook(Mutex<Option<Arc<Parking>>>);
 
-/// State of a run that the hook needs before tokio parks its thread.
+/// State of a run for the hook.
 struct Parking {
     idle: Arc<Idle>,
     shared: Arc<Shared>,
@@ -213,7 +213,7 @@ pub(crate) fn prepare<'a>(builder: &'a mut Builder, hook: &Arc<Hook>) -> &'a mut
     builder.enable_time().start_paused(true).on_thread_park(move || hook.park())
 }
 
-/// Run that has begun. Its parts are dropped in this order.
+/// Run that has begun. The parts of the run are dropped in the order of the fields.
 struct Begun<'a> {
     _recorder: Recorder<'a>,
     _entered: Entered,
@@ -268,11 +268,11 @@ where
     let hook = Arc::default();
     let runtime = prepare(&mut Builder::new_current_thread(), &hook).build().unwrap_or_else(|error| panic!("tokio cannot be started: {error}"));
     let guard = runtime.enter();
-    // The clock stands still, so this is the instant from which tokio counts its milliseconds.
+    // The clock stands still, so the reading is the instant from which tokio counts its milliseconds.
     let begun = Begun::new(core, hosts, tokio::time::Instant::now(), &hook, watched, recorded);
     drop(guard);
     runtime.block_on(async {
-        // Tasks that the program starts with tokio's `spawn_local` live in this set. The set is polled whenever it was woken, as `LocalSet::run_until` does.
+        // Tasks started by the program with tokio's `spawn_local` live in this set. As in `LocalSet::run_until`, the set is polled whenever the set was woken.
         let mut set = LocalSet::new();
         let _local = set.enter();
         let _here = begun.shared.stay();
@@ -283,7 +283,7 @@ where
             *slot.borrow_mut() = Some(came_out);
         });
         let mut beside = pin!(poll_fn(|cx| {
-            // A set without tasks is ready; it is polled again once it has a task.
+            // A set without tasks is ready. The set is polled again once the set has a task.
             let _: Poll<()> = Pin::new(&mut set).poll(cx);
             Poll::Pending
         }));
@@ -292,12 +292,12 @@ where
     })
 }
 
-/// Runs a future of another program as a task of `host` until the future is over. `block_on` runs the future that is given to it on a runtime from a builder
-/// that [`prepare`] has prepared with `hook`. `origin` is the reading of the clock when that runtime was built, which the first run finds out.
+/// Runs a future of another program as a task of `host` until the future is over. `block_on` runs the given future on a runtime whose builder was prepared by
+/// [`prepare`] with `hook`. `origin` is the reading of the clock when the runtime was built, as found out by the first run.
 ///
 /// # Panics
 ///
-/// As [`Testbed::run`](crate::Testbed::run); and if `block_on` returns before its future is over.
+/// As [`Testbed::run`](crate::Testbed::run); and if `block_on` returns before the given future is over.
 #[cfg(feature = "loopback")]
 #[expect(clippy::panic, reason = "a misuse, and the way out")]
 pub(crate) fn run_beside<F: Future>(
@@ -317,14 +317,14 @@ pub(crate) fn run_beside<F: Future>(
         let mut beside = pin!(async { outcome = Some(future.await) });
         drive(&begun, None, beside.as_mut()).await;
     };
-    // Whatever the runtime polls lives on the host, wherever it was started.
+    // All tasks of the runtime live on the host, wherever the tasks were started.
     crate::current::on_host(Some(host), || block_on(pin!(run)));
     hook.set(None);
     outcome.unwrap_or_else(|| panic!("the runtime was stopped before the end of the program"))
 }
 
-/// Polls tasks until `main` or `beside` is over. `beside` is polled whenever it was woken. Unlike [`run`], this function is not generic, so that it is compiled
-/// only once, with the test kit.
+/// Polls tasks until `main` or `beside` is over. `beside` is polled whenever `beside` was woken. Unlike [`run`], `drive` is not generic, so that the compiler
+/// translates `drive` only once, with the test kit.
 async fn drive(begun: &Begun<'_>, main: Option<JoinHandle<()>>, mut beside: Pin<&mut dyn Future<Output = ()>>) {
     let Begun { executor, shared, tasks, idle, origin, .. } = begun;
     let mut main = pin!(main);
@@ -339,10 +339,12 @@ async fn drive(begun: &Begun<'_>, main: Option<JoinHandle<()>>, mut beside: Pin<
             Arc::new(BesideWaker { is_woken: AtomicBool::new(true), main: cx.waker().clone() })
         });
         let moved = idle.moved.swap(NO_INSTANT, Ordering::Relaxed);
+        // The executor is polled, so a task goes on or the timer of the pump is over. Either way the jump of tokio has ended.
         idle.is_idle.store(false, Ordering::Relaxed);
         let synced = shared.sync((moved != NO_INSTANT).then(|| Instant::from_nanos(moved)));
         // Time does not pass before the end of this turn.
         let now = shared.now();
+        // Tasks of tokio itself must get their turn between, as with a `LocalSet`.
         let mut left = POLLS;
         let all_wait = executor.run_some(now, || {
             shared.attend();
@@ -405,7 +407,7 @@ async fn pump(shared: &Shared, tasks: &Tasks, idle: &Idle, origin: tokio::time::
     let mut due = NEVER;
     poll_fn(|cx| {
         let since = Duration::from_nanos(shared.now().as_nanos());
-        // Most often the hook has moved the clock by hand, and the timer need not be changed.
+        // Most often the hook has moved the clock by hand, and the timer stays as before.
         if !idle.is_wanted.load(Ordering::Relaxed) && since < due {
             return Poll::Pending;
         }
@@ -421,7 +423,7 @@ async fn pump(shared: &Shared, tasks: &Tasks, idle: &Idle, origin: tokio::time::
                 nothing_will_happen(shared, tasks);
             }
             // The clock has reached the millisecond of the next event, or an earlier millisecond; the hook moves the clock on. The timer is set far away, so
-            // that it does not go off again.
+            // as not to go off again.
             due = NEVER;
             timer.as_mut().reset(origin + NEVER);
             let _ = timer.as_mut().poll(cx);
@@ -431,9 +433,9 @@ async fn pump(shared: &Shared, tasks: &Tasks, idle: &Idle, origin: tokio::time::
     .await
 }
 
-/// Moves tokio's clock by `span` at once. Tokio looks at its timers before it parks.
+/// Moves tokio's clock by `span` at once. Tokio looks at its timers before parking.
 fn advance(span: Duration) {
-    // The first poll of `advance` moves the clock. Further polls would only let other tasks run first, so they are not needed.
+    // The first poll of `advance` moves the clock. Further polls would only let other tasks run first, and are not needed.
     let mut moved = pin!(tokio::time::advance(span));
     let _: Poll<()> = Pin::as_mut(&mut moved).poll(&mut Context::from_waker(Waker::noop()));
 }

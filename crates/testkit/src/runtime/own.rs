@@ -32,7 +32,7 @@ struct Here {
     executor: Cell<u64>,
     /// Indices of the runnable tasks, in the order of waking.
     ready: RefCell<Vec<usize>>,
-    /// Wakes the executor if it is itself a task of another executor.
+    /// Wakes the executor if the executor is itself a task of another executor.
     main: RefCell<Option<Waker>>,
     /// `true` if the executor waits to be woken.
     waits: Cell<bool>,
@@ -62,7 +62,7 @@ pub(crate) fn is_any_ready() -> bool {
     HERE.with(|here| !here.ready.borrow().is_empty())
 }
 
-/// Tasks that other threads have woken.
+/// Tasks woken by other threads.
 #[derive(Default)]
 struct Elsewhere {
     /// `true` if `woken` may hold tasks. Read without the lock.
@@ -74,7 +74,7 @@ struct Elsewhere {
 struct WokenElsewhere {
     /// Indices of the woken tasks.
     numbers: Vec<usize>,
-    /// Wakes the executor if it is itself a task of another executor.
+    /// Wakes the executor if the executor is itself a task of another executor.
     main: Option<Waker>,
 }
 
@@ -119,6 +119,7 @@ impl Place {
     /// Wakes the task from another thread. Not inlined, so that waking on the thread of the executor saves no registers for this path.
     #[inline(never)]
     fn wake_elsewhere(&self) {
+        // The task is in a queue and has not been polled since, so the coming poll also sees the reason of this wake.
         if self.is_queued.swap(true, Ordering::Relaxed) {
             return;
         }
@@ -151,8 +152,7 @@ pub(crate) struct Inner {
     batch: Cell<Batch>,
 }
 
-/// Tasks to poll before the tasks woken meanwhile. The batch is taken out of the thread-local queue as a whole, so that not every poll looks
-/// there.
+/// Tasks to poll before the tasks woken meanwhile. The batch is taken out of the thread-local queue as a whole, so that most polls do not touch the queue.
 #[derive(Default)]
 struct Batch {
     numbers: Vec<usize>,
@@ -199,6 +199,7 @@ impl Spawner for Executor {
         });
         let place = self.place(number);
         let waker = Waker::from(Arc::clone(&place));
+        // The first wake puts the task into the queue, so a new task is polled after the tasks that are runnable already.
         waker.wake_by_ref();
         task.is_woken_by(waker.clone());
         slots[number] = Some(Rc::new(Slot { task, place, waker }));
@@ -224,7 +225,7 @@ impl Executor {
         Arc::new(Place { number, is_queued: AtomicBool::new(false), executor: self.number, elsewhere: Arc::clone(&self.elsewhere) })
     }
 
-    /// Returns a waker of the kind that tasks have. Such a waker only notes that a task goes on, and calls no foreign code.
+    /// Returns a waker of the same kind as the wakers of tasks. Such a waker only notes a task, and calls no foreign code.
     pub(crate) fn waker(&self) -> Waker {
         Waker::from(self.place(usize::MAX))
     }
@@ -255,6 +256,7 @@ impl Executor {
             tasks.turns();
             let passed = shared.with(|core| {
                 let next = core.next_event()?;
+                // Polls at one instant count against the patience, and become steps when time passes. Events at the present instant are no progress of time.
                 if next > now {
                     steps += std::mem::take(&mut polls);
                     if next > until || steps > limits.steps {
@@ -272,7 +274,7 @@ impl Executor {
         }
     }
 
-    /// Makes this executor the one of this thread. `main` wakes the executor if it is itself a task of another executor.
+    /// Makes this executor the executor of this thread. `main` wakes the executor if the executor is itself a task of another executor.
     pub(crate) fn begin(&self, main: Option<&Waker>) {
         HERE.with(|here| {
             // Tasks of another executor, such as of an earlier run, are of no use here.
@@ -300,13 +302,14 @@ impl Executor {
             }
         }
         self.batch.set(batch);
+        // From now on a wake must also wake the task of the executor, because nobody looks at the queue before.
         if all_wait {
             HERE.with(|here| here.waits.set(true));
         }
         all_wait
     }
 
-    /// Returns the task that was polled last, or `None` if that task is over.
+    /// Returns the last polled task, or `None` if the task is over.
     pub(crate) fn last(&self) -> Option<Rc<Task>> {
         self.slots.borrow().get(self.last.get()).and_then(Option::as_ref).map(|slot| Rc::clone(&slot.task))
     }
@@ -343,8 +346,10 @@ impl Executor {
         batch.next = 0;
         HERE.with(|here| std::mem::swap(&mut batch.numbers, &mut here.ready.borrow_mut()));
         if self.elsewhere.is_any.load(Ordering::Relaxed) {
+            // The mark is set and cleared under the lock, so no task is left behind without a mark.
             let mut woken = self.elsewhere.lock();
             self.elsewhere.is_any.store(false, Ordering::Relaxed);
+            // Tasks woken by other threads come last: the order of such wakes depends on the machine, and must not move the tasks woken on this thread.
             batch.numbers.append(&mut woken.numbers);
         }
         batch.take()
@@ -379,7 +384,7 @@ where
     let _entered = enter(&shared, &tasks);
     // The drop of the recorder ends the run. By then the guard below has put the state back, where other threads find it.
     let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
-    // After `enter`, which has checked that no other test bed runs on this thread.
+    // After `enter`, because `enter` checks that no second test bed runs on this thread.
     let _here = shared.stay();
     let outcome = Rc::new(RefCell::new(None));
     // Boxed, because a program may hold arrays, and without optimisation each call to which a future is passed keeps a copy on the stack.

@@ -113,8 +113,8 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// The errors of the last tried address: the socket cannot send to the address, because it is of the other version of IP, of a network that cannot be
-    /// reached, or a broadcast address without [`UdpSocket::set_broadcast`].
+    /// The errors of the last tried address: the socket cannot send to the address, because the address is of the other version of IP, of a network that cannot
+    /// be reached, or a broadcast address without [`UdpSocket::set_broadcast`].
     #[expect(clippy::unused_async, reason = "as tokio's")]
     pub async fn connect(&self, peer: impl ToSocketAddrs) -> io::Result<()> {
         self.shared.check_open(self.host, KIND)?;

@@ -128,8 +128,8 @@ impl UdpSocket {
         self.option(|options| &options.type_of_service)
     }
 
-    /// Sets the type of service of IPv4, from 0 to 255. If one of the two lowest bits is set, an active queue marks a datagram that it would otherwise drop
-    /// (RFC 3168).
+    /// Sets the type of service of IPv4, from 0 to 255. If one of the two lowest bits is set, an active queue marks a datagram in place of dropping the
+    /// datagram (RFC 3168).
     ///
     /// # Errors
     ///
@@ -277,7 +277,7 @@ impl UdpSocket {
         operation()
     }
 
-    /// Performs an operation of the caller, and repeats it whenever it would have blocked and something can be read.
+    /// Performs an operation of the caller. After an operation that would have blocked, waits until a datagram can be read, and repeats the operation.
     ///
     /// # Errors
     ///

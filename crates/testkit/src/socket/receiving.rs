@@ -57,7 +57,7 @@ impl UdpSocket {
         self.look::<false, _>(move |datagram| (datagram.copy_to(buffer), datagram.from(), datagram.arrival.at))
     }
 
-    /// Copies the next datagram without taking it from the socket. Returns the number of bytes copied.
+    /// Copies the next datagram, which stays in the socket. Returns the number of bytes copied.
     ///
     /// # Errors
     ///
@@ -66,7 +66,7 @@ impl UdpSocket {
         self.look::<true, _>(move |datagram| datagram.copy_to(buffer))
     }
 
-    /// Copies the next datagram without taking it from the socket. Returns the number of bytes copied, and the sender.
+    /// Copies the next datagram, which stays in the socket. Returns the number of bytes copied, and the sender.
     ///
     /// # Errors
     ///
@@ -120,7 +120,7 @@ impl UdpSocket {
         self.try_look::<false, _>(|datagram| (datagram.put_into(buffer), datagram.from()))
     }
 
-    /// Copies the next datagram, if any, without taking it from the socket. Returns the number of bytes copied.
+    /// Copies the next datagram, if any. The datagram stays in the socket. Returns the number of bytes copied.
     ///
     /// # Errors
     ///
@@ -129,7 +129,7 @@ impl UdpSocket {
         self.try_look::<true, _>(|datagram| datagram.copy_to(buffer))
     }
 
-    /// Copies the next datagram, if any, without taking it from the socket. Returns the number of bytes copied, and the sender.
+    /// Copies the next datagram, if any. The datagram stays in the socket. Returns the number of bytes copied, and the sender.
     ///
     /// # Errors
     ///
@@ -147,7 +147,7 @@ impl UdpSocket {
         self.try_look::<true, _>(Parcel::from)
     }
 
-    /// Receives a datagram. If there is none, the task is woken when one arrives.
+    /// Receives a datagram. Without a datagram the task is woken when a datagram arrives.
     ///
     /// # Errors
     ///

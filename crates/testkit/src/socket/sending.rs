@@ -16,8 +16,8 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// `ConnectionRefused` if no socket is bound to the port of the peer. Those of the system without a peer (`EDESTADDRREQ`), and if the datagram is too long
-    /// (`EMSGSIZE`).
+    /// `ConnectionRefused` if no socket is bound to the port of the peer; the error of the system without a peer (`EDESTADDRREQ`) or for a datagram that is too
+    /// long (`EMSGSIZE`).
     #[expect(clippy::unused_async, reason = "as tokio's")]
     pub async fn send(&self, bytes: &[u8]) -> io::Result<usize> {
         self.try_send(bytes)
@@ -74,13 +74,14 @@ impl UdpSocket {
     fn send_to_now(&self, to: &impl ToSocketAddrs, bytes: &[u8]) -> io::Result<usize> {
         match to.to_socket_addr() {
             Ok(to) => self.send_now(Some(&to), bytes, Ecn::NotCapable),
-            // A name cannot be looked up outside of the run. If the socket may not be used, that is the more useful error.
+            // A name cannot be looked up outside of the run. The error of a socket that may not be used is more useful than the error of the name.
             Err(error) => self.shared.check_open(self.host, KIND).and(Err(error)),
         }
     }
 
     #[inline]
     pub(crate) fn send_now(&self, to: Option<&SocketAddr>, bytes: &[u8], ecn: Ecn) -> io::Result<usize> {
+        // Quinn passes the codepoint of each datagram. All other callers pass none, and the type of service of the socket decides.
         let ecn = if ecn.is_capable() { ecn } else { self.options.ecn() };
         let outgoing = Outgoing { to, bytes, ecn };
         self.shared.open(self.host, KIND, |core| core.send(self.id, outgoing))??;

@@ -32,10 +32,10 @@ pub fn links_like<L: Likeness>(like: L) -> L::Links {
 
 /// Description of the links that [`links_like`] draws.
 ///
-/// With the feature `files`, a text names a link of the library. A factor is drawn for each number of which the library knows how it differs between the
-/// links of this kind: `lte-driving delay*1.4` has 1.4 times the delay of `lte-driving`. The number lies between the 10th and the 90th percentile, and its
-/// logarithm is uniform. A link of which the library knows no such range, such as `starlink`, is drawn as it is. The drawn link is given to `Testbed::access`
-/// of a host. If the name has a direction, or both directions are equal, [`Testbed::links`](crate::Testbed::links) and the like take the link too.
+/// With the feature `files`, a text names a link of the library. A factor is drawn for each number with a range in the library: `lte-driving delay*1.4` has
+/// 1.4 times the delay of `lte-driving`. The range of a number reaches from the 10th to the 90th percentile of the links of this kind, and the logarithm of
+/// the number is uniform. A link without a range in the library, such as `starlink`, is drawn unchanged. The drawn link is given to `Testbed::access` of a
+/// host. If the name has a direction, or both directions are equal, [`Testbed::links`](crate::Testbed::links) and the like take the link too.
 pub trait Likeness {
     /// Strategy of the links.
     type Links: Strategy;
@@ -68,8 +68,8 @@ pub fn any_network(hosts: usize) -> Networks {
     networks_like(hosts, LinkBounds::any())
 }
 
-/// Draws networks of `hosts` hosts whose links are within bounds. They shrink to the least impaired network on which the test still fails. About a quarter of
-/// the links is impaired in a third of all networks, half of the links in another third, and all links in the last third.
+/// Draws networks of `hosts` hosts with links within bounds. The networks shrink to the least impaired network on which the test still fails. About a quarter
+/// of the links is impaired in a third of all networks, half of the links in another third, and all links in the last third.
 ///
 /// # Panics
 ///
@@ -135,6 +135,7 @@ impl Strategy for Networks {
 
     fn new_tree(&self, runner: &mut TestRunner) -> NewTree<Self> {
         let mut network = self.ideal.clone();
+        // The share is drawn once for the network. With a draw per link every network would have about half of its links impaired.
         let impaired = Dice(runner.rng()).pick(1, &[2, 4]);
         let hosts = network.hosts();
         let pairs = (0..hosts).flat_map(|from| (0..hosts).map(move |to| (NodeId::new(from), NodeId::new(to)))).filter(|(from, to)| from != to);

@@ -128,7 +128,7 @@ impl LinkBounds {
         self.time(Stage::Jitter, &range)
     }
 
-    /// Sets the range of the long-run loss \[%\]. Models with bursts keep it to a hundredth of a percent.
+    /// Sets the range of the long-run loss \[%\]. Models with bursts keep the range to a hundredth of a percent.
     #[must_use]
     pub fn loss(self, range: RangeInclusive<f64>) -> Self {
         self.percent(Stage::Loss, &range)
@@ -209,7 +209,7 @@ impl LinkBounds {
         self
     }
 
-    /// Makes the stage present in every link. Shrinking does not remove it.
+    /// Makes the stage present in every link. Shrinking does not remove the stage.
     #[must_use]
     pub const fn always(mut self, stage: Stage) -> Self {
         self.presence[stage.place()] = Presence::Always;
@@ -239,6 +239,7 @@ impl LinkBounds {
         if let Some(fault) = &self.fault {
             return Err(fault.clone());
         }
+        // Jitter must not exceed the mean delay. If even the least jitter exceeds the longest delay, no link can be drawn.
         let (jitter, delay) = (self.span(Stage::Jitter).low, self.span(Stage::Delay).high);
         if self.presence(Stage::Jitter) != Presence::Never && jitter > delay {
             return Err(BoundsError::JitterAboveDelay { jitter: Duration::from_nanos(jitter), delay: Duration::from_nanos(delay) });
@@ -256,6 +257,7 @@ impl LinkBounds {
     }
 
     fn refuse(mut self, error: BoundsError) -> Self {
+        // The methods of the builder return no errors. The first fault is kept for `check`.
         self.fault = self.fault.or(Some(error));
         self
     }
@@ -263,6 +265,7 @@ impl LinkBounds {
     fn set(&mut self, stage: Stage, low: u64, high: u64) {
         let place = stage.place();
         (self.spans[place].low, self.spans[place].high) = (low, high);
+        // A range permits the stage, and does not take back an earlier `always`.
         if self.presence[place] == Presence::Never {
             self.presence[place] = Presence::Maybe;
         }
@@ -277,6 +280,7 @@ impl LinkBounds {
         if let Err(error) = check(stage, low, high, |time| format!("{time:?}")) {
             return self.refuse(error);
         }
+        // Zero has no effect, so the range begins at a microsecond instead. A range that ends earlier becomes its end.
         let low = if low.is_zero() { high.min(Duration::from_micros(1)) } else { low };
         self.set(stage, nanos(low), nanos(high));
         self
@@ -291,6 +295,7 @@ impl LinkBounds {
         if let Err(error) = check(stage, units(low), units(high), |units| percent(units).to_string()) {
             return self.refuse(error);
         }
+        // Zero has no effect, so the range begins at a hundredth of a percent instead. A range that ends earlier becomes its end.
         let least = if units(low) == 0 { units(high).min(PERCENT / 100) } else { units(low) };
         self.set(stage, least, units(high));
         self

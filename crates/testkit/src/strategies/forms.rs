@@ -37,7 +37,7 @@ pub(super) enum Form {
 }
 
 impl Form {
-    /// All changes. A chain has up to four probabilities that can be removed, so that change is listed four times.
+    /// Changes, in the order of trial. `LastProbability` is listed four times, because a chain has up to four removable probabilities.
     pub(super) const ALL: [Self; 19] = [
         Self::Reordering,
         Self::Jitter,
@@ -65,12 +65,14 @@ impl Form {
         let old = link.netem();
         let mut netem = old.clone();
         match self {
+            // The delay is kept: a delay alone is the plainer form. The removal of the delay is the matter of the stages.
             Self::Reordering => return stage::without(old, &[Stage::Reorder], true),
             Self::Jitter => return stage::without(old, &[Stage::Jitter], true),
             Self::JitterCorrelation => change(jitter_mut(&mut netem), |jitter: &mut JitterSpec| jitter.correlation = None),
             Self::JitterDistribution => change(jitter_mut(&mut netem), |jitter| jitter.distribution = None),
             Self::LossInBursts => {
                 if let Some(LossSpec::Gemodel(_) | LossSpec::State(_)) = old.loss {
+                    // A chain keeps the bounds within a tolerance only. Random loss must keep the bounds exactly.
                     let span = bounds.span(Stage::Loss);
                     let loss = long_run(link).unwrap_or(span.low).clamp(span.low, span.high);
                     netem.loss = Some(LossSpec::Random(ChanceSpec { percent: percent(loss), correlation: None }));
@@ -142,5 +144,6 @@ fn without_last_probability(loss: LossSpec, share: u64) -> LossSpec {
             fitting(share, most, |p13| LossSpec::State(StateSpec { p13: percent(p13), ..state }))
         }
     }
+    // Without a fitting chain the loss stays unchanged, and the form counts as impossible.
     .unwrap_or(loss)
 }

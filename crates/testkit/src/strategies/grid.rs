@@ -36,7 +36,7 @@ fn next_below(value: u64, digits: u32, step: u64) -> Option<u64> {
     Some(count / unit(count, digits) * unit(count, digits) * step)
 }
 
-/// Returns the next round number after `value` on the way to `goal`, or `goal` if there is none before it.
+/// Returns the next round number after `value` on the way to `goal`, or `goal` if no round number precedes `goal`.
 pub(super) fn next_towards(goal: u64, value: u64, digits: u32, step: u64) -> u64 {
     if goal < value {
         next_below(value, digits, step).map_or(goal, |next| next.max(goal))
@@ -87,11 +87,12 @@ impl Dice<'_> {
         number.clamp(*range.start(), *range.end())
     }
 
-    /// Draws a number of a range. In a tenth of all cases each the result is the lower end, the upper end, or any number. Otherwise it has two significant
-    /// digits; in half of all cases every decade is equally likely.
+    /// Draws a number of a range. In a tenth of all cases each the result is the lower end, the upper end, or any number. Otherwise the result has two
+    /// significant digits; in half of all cases every decade is equally likely.
     pub(super) fn number(&mut self, span: Span) -> u64 {
         let Span { low, high, step } = span;
         let anywhere = |dice: &mut Self| low + dice.below((high - low).saturating_add(1));
+        // Round numbers are preferred, because shrinking needs more tries for a number with more digits.
         match self.below(10) {
             0 => low,
             1 => high,

@@ -12,9 +12,9 @@ use super::shrink::{Number, Search, Space};
 use crate::hit::{Action, Hit, Hits, PathHit, Which, push_number};
 use crate::words::hits_on;
 
-/// Draws sets of packets that are hit, among the first `packets` packets of every path between these hosts. Each hit applies one of the actions, given by the
-/// words before the packets: `drop`, `delay 200ms`, `behind 2`. About a sixteenth of the packets is hit in a third of all sets, a quarter in another third, and
-/// half in the last third.
+/// Draws sets of hits on packets, among the first `packets` packets of every path between these hosts. Each hit applies an action, given by the words before
+/// the packets: `drop`, `delay 200ms`, `behind 2`. About a sixteenth of the packets is hit in a third of all sets, a quarter in another third, and half in the
+/// last third.
 ///
 /// A set shrinks until no packet can be left out. An action becomes the first action wherever the test then fails as well. Shrinking tries all packets at once,
 /// then halves, and so on down to single packets. Leaving a hit out [changes nothing else](crate::hit) on the links.
@@ -76,6 +76,7 @@ impl Strategy for PacketSets {
 #[track_caller]
 #[expect(clippy::panic, reason = "documented: actions stand in a test")]
 fn action(words: &str) -> Action {
+    // The parser knows whole hits only, so a packet is added to the words of the action.
     match hits_on(&format!("{words} packet 0")).as_deref() {
         Ok([Hit { action, .. }]) => *action,
         Ok(_) => panic!("`{words}` is more than one action: expected a single one, such as `drop`"),
@@ -98,6 +99,7 @@ impl Strategy for Sets {
 
     fn new_tree(&self, runner: &mut TestRunner) -> NewTree<Self> {
         let mut dice = Dice(runner.rng());
+        // The share is drawn once for the set, so that sparse sets and dense sets both occur.
         let one_in = dice.pick(2, &[4, 16]);
         let mut set = Set::new();
         let hosts = self.space.hosts.len();
@@ -156,6 +158,7 @@ impl Space for SetSpace {
     }
 
     fn forms(&self, set: &Set) -> Vec<Self::Form> {
+        // Action 0 is the plainest action: the first of the test, into which shrinking turns all others.
         set.iter().filter(|(_, action)| **action > 0).map(|(packet, _)| *packet).collect()
     }
 

@@ -1,4 +1,4 @@
-//! Strategy of links like one of the library: a factor for each number that differs from link to link.
+//! Strategy of links like a link of the library, with a factor for each number that differs from link to link.
 
 use proptest::strategy::{NewTree, Strategy, ValueTree};
 use proptest::test_runner::TestRunner;
@@ -8,7 +8,7 @@ use super::grid::Dice;
 use super::shrink::{Number, Search, Space};
 use crate::library::LibraryLink;
 
-/// Strategy of links like one of the library: see [`Likeness`].
+/// Strategy of links like a link of the library: see [`Likeness`].
 #[derive(Clone, Debug)]
 #[must_use = "strategies do nothing unless used"]
 pub struct LibraryLinks {
@@ -42,7 +42,7 @@ impl Strategy for LibraryLinks {
     }
 }
 
-/// Space of the links like one of the library.
+/// Space of the links like a link of the library.
 #[derive(Clone, Debug)]
 struct FactorSpace {
     /// Link to which all links shrink.
@@ -50,7 +50,7 @@ struct FactorSpace {
 }
 
 impl FactorSpace {
-    /// Returns the keys whose factor is not that of the usual link.
+    /// Returns the keys whose factor differs from the factor of the usual link.
     fn changed(&self, link: &LibraryLink) -> Vec<String> {
         self.usual.ranges().into_keys().filter(|key| link.factor(key) != self.usual.factor(key)).collect()
     }
@@ -90,7 +90,7 @@ impl Space for FactorSpace {
     }
 
     fn with_number(&self, link: &LibraryLink, key: &String, factor: u64) -> Option<LibraryLink> {
-        // A test may name a usual link out of the range, so that the way to it need not lie within.
+        // A test may give a usual link outside of the range. The numbers on the way there need not lie within the range either.
         self.usual.ranges().contains_key(key).then(|| link.with_factor(key, factor))
     }
 }

@@ -206,6 +206,7 @@ impl ImpairedNetwork {
 
     /// Stores a link. An ideal link is not stored.
     fn put(&mut self, from: NodeId, to: NodeId, link: ImpairedLink) {
+        // Equal networks must have equal maps, because `PartialEq` compares the maps.
         if link == self.ideal {
             self.links.remove(&(from, to));
         } else {
@@ -249,6 +250,7 @@ impl FromStr for ImpairedNetwork {
         let count = first.strip_suffix("hosts").or_else(|| first.strip_suffix("host")).and_then(|count| count.trim().parse().ok());
         let hosts: usize = count.filter(|count| (1..=MOST).contains(count)).ok_or_else(|| NetworkTextError::Hosts { found: first.to_owned() })?;
         let mut network = Self::ideal(hosts);
+        // The network stores no ideal links, so a repeated line of an ideal link would not be noticed there.
         let mut said = BTreeSet::new();
         for line in lines {
             let halves = line.split_once("->").and_then(|(from, rest)| rest.split_once(':').map(|(to, words)| (from.trim(), to.trim(), words)));

@@ -48,7 +48,7 @@ impl Knob {
     }
 }
 
-/// All numbers, in the order of shrinking. A correlation shrinks to one percent, a gap to two packets.
+/// Numbers of netem's words, in the order of shrinking. A correlation shrinks to one percent, a gap to two packets.
 pub(super) const KNOBS: [Knob; 27] = [
     // Jitter comes before the delay, because the delay must not be less than the jitter.
     Knob { goal: Goal::Low(Stage::Jitter), read: |n| Some(nanos(jitter(n)?.time)), write: |n, v| put(jitter_mut(n).map(|j| &mut j.time), time(v)) },

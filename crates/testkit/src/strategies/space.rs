@@ -23,6 +23,7 @@ impl LinkSpace {
         if netem == *link.netem() {
             return None;
         }
+        // A change of one number can break the bounds of another: a delay below its jitter, for instance.
         ImpairedLink::new(netem).ok().filter(|link| self.0.admits(link))
     }
 }
@@ -76,7 +77,7 @@ pub(super) type Pair = (NodeId, NodeId);
 /// Part of a network.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum NetworkPart {
-    /// All removable stages of a link.
+    /// The removable stages of a link together.
     Link(Pair),
     /// A single stage of a link.
     Stage(Pair, Stage),
@@ -125,6 +126,7 @@ impl Space for NetworkSpace {
                 },
             }
         }
+        // A link that cannot change refuses the whole group. The search then tries halves of the group.
         gone.into_iter().try_fold(network.clone(), |network, (pair, stages)| Self::changed(&network, pair, |link| self.0.without(link, &stages)))
     }
 

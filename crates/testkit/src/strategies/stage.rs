@@ -10,7 +10,7 @@ use cohaptic_wan::netem::{ChanceSpec, DelaySpec, LossSpec, Netem, Percent};
 pub enum Stage {
     /// `limit PACKETS`.
     Limit,
-    /// `delay TIME`, equal for every packet. If there is jitter or reordering, the delay belongs to that stage and does not count by itself.
+    /// `delay TIME`, equal for every packet. With jitter or reordering, the delay belongs to the jitter or the reordering and does not count by itself.
     Delay,
     /// `delay TIME JITTER`, including the mean delay.
     Jitter,
@@ -29,7 +29,7 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// All stages, in their order.
+    /// Stages, in the order of netem's words.
     pub const ALL: [Self; 9] =
         [Self::Limit, Self::Delay, Self::Jitter, Self::Loss, Self::Corrupt, Self::Duplicate, Self::Reorder, Self::Rate, Self::Slot];
 
@@ -98,8 +98,10 @@ pub(super) fn without(netem: &Netem, stages: &[Stage], keeps_delay: bool) -> Net
     for stage in stages {
         match stage {
             Stage::Limit => less.limit = None,
+            // Removed below, where all stages that need the delay are known.
             Stage::Delay => {}
             Stage::Jitter => less.delay = less.delay.map(|delay| DelaySpec { jitter: None, ..delay }),
+            // `ecn` marks packets in place of losing packets, and netem refuses `ecn` without loss.
             Stage::Loss => (less.loss, less.ecn) = (None, false),
             Stage::Corrupt => less.corrupt = None,
             Stage::Duplicate => less.duplicate = None,

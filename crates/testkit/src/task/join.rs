@@ -9,7 +9,7 @@ use std::task::{Context, Poll, Waker};
 
 use super::Task;
 
-/// Handle of a task: a future of the outcome of the task. Dropping the handle does not stop the task.
+/// Handle of a task: a future for the outcome of the task. Dropping the handle does not stop the task.
 pub struct JoinHandle<T> {
     state: Rc<RefCell<State<T>>>,
     task: Weak<Task>,
@@ -61,9 +61,7 @@ impl<T> fmt::Debug for JoinHandle<T> {
 impl<T> Future for JoinHandle<T> {
     type Output = Result<T, TaskStopped>;
 
-    /// # Panics
-    ///
-    /// If the handle is polled again after it has returned the outcome.
+    /// Returns the outcome once. A handle that is polled again afterwards stays pending for ever.
     fn poll(self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Self::Output> {
         let mut state = self.state.borrow_mut();
         if let Some(outcome) = state.outcome.take() {
@@ -77,7 +75,7 @@ impl<T> Future for JoinHandle<T> {
 /// Wraps `future` into a program that stores the output of `future`. Returns the program, and the place of the output.
 pub(crate) fn joined<F: Future>(future: F) -> (impl Future<Output = ()>, Rc<RefCell<State<F::Output>>>) {
     let state = Rc::new(RefCell::new(State { outcome: None, waker: None }));
-    // The guard tells the waiting task of the end, even if the program is dropped before its end.
+    // The guard reports the end to the waiting task, even if the program is dropped before its end.
     let told = Told(Rc::clone(&state));
     let program = async move {
         let outcome = future.await;
@@ -96,6 +94,7 @@ impl<T> Drop for Told<T> {
         if state.outcome.is_none() {
             state.outcome = Some(Err(TaskStopped));
         }
+        // The waker is called after the borrow has ended: a foreign waker may poll the handle at once.
         let waker = state.waker.take();
         drop(state);
         if let Some(waker) = waker {

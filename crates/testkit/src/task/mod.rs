@@ -1,4 +1,4 @@
-//! Tasks: futures that live on hosts. Any executor can poll them.
+//! Tasks: futures on hosts. Any executor can poll the futures.
 
 mod join;
 #[cfg(feature = "facade")]
@@ -34,13 +34,13 @@ pub(crate) type Program = Pin<Box<dyn Future<Output = ()>>>;
 pub(crate) struct Task {
     runner: Runner,
     pulse: Arc<Pulse>,
-    /// Number by which the pulse knows the task.
+    /// Number of the task in the pulse.
     number: usize,
     /// Future of the task; `None` once the task is over or was stopped.
     program: RefCell<Option<Program>>,
     /// Instant of the last poll. The task waits since then.
     polled: Cell<Instant>,
-    /// `true` if the task was stopped, perhaps while it was being polled.
+    /// `true` if the task was stopped, perhaps during a poll of the task.
     is_doomed: Cell<bool>,
     /// Waker of the task. Every poll uses the same waker.
     waker: RefCell<Option<Waker>>,
@@ -71,6 +71,7 @@ impl Task {
         self.polled.set(now);
         let mut program = self.program.borrow_mut();
         let Some(future) = program.as_mut() else { return Poll::Ready(()) };
+        // The watchdog learns which task has the thread. A poll that never returns is reported with the name of this task.
         self.pulse.begins(self.number);
         let polled = current::on_host(self.runner.host, || future.as_mut().poll(cx));
         self.pulse.returns();
@@ -89,14 +90,15 @@ impl Task {
         current::on_host(self.runner.host, || drop(program));
     }
 
-    /// Stops the task: drops its program. A task that stops itself is dropped when the poll returns.
+    /// Stops the task: drops the program. A task that stops itself is dropped when the poll returns.
     pub(crate) fn stop(&self) {
         self.is_doomed.set(true);
-        // The program is borrowed while it is being polled. `poll` then drops it, because the task is doomed.
+        // The program is borrowed during a poll. `poll` then drops the program, because the task is doomed.
         let Ok(mut program) = self.program.try_borrow_mut() else { return };
         let over = program.take();
         drop(program);
         self.drop_there(over);
+        // The executor polls the task once more, finds no program, and frees the index of the task.
         let waker = self.waker.borrow_mut().take();
         if let Some(waker) = waker {
             waker.wake();
@@ -129,13 +131,13 @@ pub(crate) trait Spawner {
 /// Function that makes the program of a host anew.
 type Factory = Rc<dyn Fn() -> Program>;
 
-/// All tasks of a test bed.
+/// Tasks of a test bed.
 pub(crate) struct Tasks {
     pulse: Arc<Pulse>,
     spawner: Box<dyn Spawner>,
     /// Tasks started so far, some of which may be over.
     known: RefCell<Vec<Weak<Task>>>,
-    /// Program of each host with the place where it was given, indexed by host.
+    /// Program of each host with the place of the call that gave the program, indexed by host.
     factories: RefCell<Vec<Option<(Factory, &'static Location<'static>)>>>,
     /// Tasks that tokio polls.
     #[cfg(feature = "facade")]
@@ -189,6 +191,7 @@ impl Tasks {
     pub(crate) fn restart(&self, host: NodeId) {
         let factory = self.factories.borrow()[host.index()].clone();
         if let Some((factory, origin)) = factory {
+            // The factory is code of the test and may use sockets of the host, so the host is set for the factory too.
             let program = current::on_host(Some(host), || factory());
             self.start(Some(host), origin, program);
         }
@@ -203,9 +206,10 @@ impl Tasks {
         self.others.stop_all_of(host);
     }
 
-    /// Stops all tasks, and the tasks that are spawned while others are dropped.
+    /// Stops all tasks, also the tasks that are spawned while tasks are dropped.
     pub(crate) fn stop_all(&self) {
         loop {
+            // The list is emptied before any task is stopped: destructors may spawn tasks, and the next round stops these tasks.
             let all: Vec<Rc<Task>> = self.known.borrow_mut().drain(..).filter_map(|task| task.upgrade()).collect();
             if all.is_empty() {
                 return;

@@ -8,7 +8,7 @@ use cohaptic_wan::NodeId;
 use super::signals::Handlers;
 use crate::current;
 
-/// The ways to stop the tasks that tokio polls for hosts of a run, and the signals for which the programs of the hosts listen.
+/// Handles for stopping tokio's tasks of the hosts of a run, and the signals for which the programs of the hosts listen.
 #[derive(Default)]
 pub(crate) struct OtherTasks {
     stops: Mutex<Vec<(NodeId, Box<dyn Stop>)>>,

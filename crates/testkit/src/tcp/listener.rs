@@ -26,7 +26,7 @@ const BACKLOG: usize = 128;
 /// - The listener is bound on the host of the task that calls `bind`; [`Host::listen`](crate::Host::listen) names another host.
 /// - At most 129 connections wait to be accepted; [`TcpSocket::listen`](crate::TcpSocket::listen) takes another number. As with Linux, a SYN beyond that number
 ///   is dropped without an answer, so that its sender tries again after 1, 3, 7 … s.
-/// - A connection that is reset while it waits is accepted all the same, and reading from it fails.
+/// - A connection that is reset during the wait is accepted all the same, and reading from the connection fails.
 /// - A listener at `[::]` accepts connections over both versions of IP, as with Linux. The peer of a connection over IPv4 is then shown as `::ffff:10.0.0.1`.
 ///   [`TcpSocket::set_only_v6`](crate::TcpSocket::set_only_v6) leaves IPv4 to other sockets.
 /// - After its host has crashed, every method returns [`io::ErrorKind::ConnectionAborted`], with the way out. The same error comes from every method after the
@@ -63,6 +63,7 @@ impl TcpListener {
         each(address, |address| {
             let (held, config) = shared.with(|core| {
                 core.check_up(host)?;
+                // Tokio, too, sets `SO_REUSEADDR` for listeners, so that a program can listen again while old connections linger.
                 let held = core.hold_port(host, address, Sharing { is_shared: true, is_only_six: false })?;
                 io::Result::Ok((held, core.tcp_config(host).clone()))
             })?;
@@ -70,7 +71,7 @@ impl TcpListener {
         })
     }
 
-    /// Listens at a port that is held. If that fails, the port is released.
+    /// Listens at a held port. After an error the port is released.
     pub(super) fn listen(shared: Arc<Shared>, host: NodeId, held: (HoldId, SocketAddr), backlog: usize, inherited: Inherited) -> io::Result<Self> {
         let id = shared.open(host, KIND, |core| {
             let listening = core.listen(host, held, backlog, inherited);
@@ -103,7 +104,7 @@ impl TcpListener {
         poll_fn(|cx| self.poll_accept(cx)).await
     }
 
-    /// Accepts a connection. If there is none, the task is woken when one can be accepted.
+    /// Accepts a connection. If no connection waits, the task is woken when a connection can be accepted.
     ///
     /// # Errors
     ///
@@ -131,7 +132,7 @@ impl TcpListener {
         self.open(|core| core.listener_address(self.id))
     }
 
-    /// Reads or changes what the connections that will be accepted inherit: the constants of TCP, and the time to linger.
+    /// Reads or changes the inheritance of the connections to be accepted: the constants of TCP, and the time to linger.
     #[cfg(feature = "facade")]
     pub(crate) fn inherited<T>(&self, act: impl FnOnce(&mut TcpConfig, &mut Option<std::time::Duration>) -> T) -> io::Result<T> {
         self.open(|core| {

@@ -1,7 +1,7 @@
 //! TCP: the configuration and the state of connections.
 //!
-//! [`TcpListener`], [`TcpStream`] and [`TcpSocket`](crate::TcpSocket) have the methods of tokio's types, on a real TCP ([`cohaptic_tcp`]) whose segments are
-//! packets on the emulated links. The size of such a packet on its link is its whole length, headers of IP and TCP included; a UDP datagram counts with its
+//! [`TcpListener`], [`TcpStream`] and [`TcpSocket`](crate::TcpSocket) have the methods of tokio's types, on a real TCP ([`cohaptic_tcp`]). The segments are
+//! packets on the emulated links. A packet of TCP counts on its link with the whole length, headers of IP and TCP included; a UDP datagram counts with the
 //! content only. The module [`net`](crate::net) has the names of `tokio::net`, so that a program runs here after changing one import.
 
 #[cfg(feature = "facade")]

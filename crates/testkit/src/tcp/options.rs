@@ -21,8 +21,8 @@ impl TcpStream {
         self.open_alive(|core| core.connection(self.id).nodelay())
     }
 
-    /// Sets whether small segments leave while earlier segments are not acknowledged. If not, Nagle's algorithm holds them back. Turning the option on sends
-    /// the segments that were held back.
+    /// Sets whether small segments leave while earlier segments are not acknowledged. If not, Nagle's algorithm holds small segments back. Turning the option
+    /// on sends the segments that were held back.
     ///
     /// # Errors
     ///
@@ -96,8 +96,8 @@ impl TcpStream {
         self.change(|_, connection| connection.set_ttl(ttl))
     }
 
-    /// Sets the times of keep-alive probes, which are sent while no data is sent (`SO_KEEPALIVE`, `TCP_KEEPIDLE`, `TCP_KEEPINTVL`, `TCP_KEEPCNT`). `None` turns
-    /// probing off. With tokio these options need `socket2`.
+    /// Sets the times of keep-alive probes for a connection without data (`SO_KEEPALIVE`, `TCP_KEEPIDLE`, `TCP_KEEPINTVL`, `TCP_KEEPCNT`). `None` turns probing
+    /// off. With tokio these options need `socket2`.
     ///
     /// # Errors
     ///

@@ -12,11 +12,11 @@ use tokio::io::ReadBuf;
 use super::TcpStream;
 use super::split::{both, reading, writing};
 
-/// Owned half of a stream that reads: see [`TcpStream::into_split`].
+/// Owned reading half of a stream: see [`TcpStream::into_split`].
 #[derive(Debug)]
 pub struct OwnedReadHalf(Arc<TcpStream>);
 
-/// Owned half of a stream that writes: see [`TcpStream::into_split`]. Dropping this half sends FIN.
+/// Owned writing half of a stream: see [`TcpStream::into_split`]. Dropping this half sends FIN.
 #[derive(Debug)]
 pub struct OwnedWriteHalf {
     stream: Arc<TcpStream>,

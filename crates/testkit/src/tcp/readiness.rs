@@ -81,8 +81,9 @@ impl TcpStream {
     ///
     /// As [`TcpStream::try_read`].
     pub fn try_read_buf<B: BufMut>(&self, buffer: &mut B) -> io::Result<usize> {
-        // The same space that tokio would use of a buffer that grows.
+        // Tokio, too, fills only the contiguous free space of a growing buffer.
         let room = buffer.chunk_mut().len().min(buffer.remaining_mut());
+        // The temporary memory is no longer than the received bytes. One byte at least, so that an empty stream answers with its end or `WouldBlock`.
         let unread = self.open(|core| core.connection(self.id).info().unread)?;
         let mut read = vec![0; room.min(unread.max(1))];
         let count = self.try_read(&mut read)?;
@@ -159,7 +160,7 @@ impl TcpStream {
         operation()
     }
 
-    /// Performs an operation of the caller, and repeats it whenever it would have blocked and the stream is ready again.
+    /// Performs an operation of the caller. After an operation that would have blocked, waits until the stream is ready, and repeats the operation.
     ///
     /// # Errors
     ///

@@ -109,8 +109,8 @@ impl TcpSocket {
     /// # Errors
     ///
     /// [`io::ErrorKind::AddrInUse`] if another socket has the port and not both sockets are [shared](TcpSocket::set_reuseaddr), or if another socket listens
-    /// there; [`io::ErrorKind::AddrNotAvailable`] if the host does not have the address; [`io::ErrorKind::InvalidInput`] if the socket is bound already. That
-    /// of the system if the address is of the other version of IP (`EAFNOSUPPORT`).
+    /// there; [`io::ErrorKind::AddrNotAvailable`] if the host does not have the address; [`io::ErrorKind::InvalidInput`] if the socket is bound already; the
+    /// error of the system (`EAFNOSUPPORT`) if the address is of the other version of IP.
     pub fn bind(&self, address: SocketAddr) -> io::Result<()> {
         let mut settings = self.settings();
         if settings.bound.is_some() || address.is_ipv6() != self.is_six {
@@ -137,11 +137,12 @@ impl TcpSocket {
     ///
     /// # Errors
     ///
-    /// As [`TcpStream::connect`]; that of the system if the address is of the other version of IP (`EAFNOSUPPORT`).
+    /// As [`TcpStream::connect`]; the error of the system (`EAFNOSUPPORT`) if the address is of the other version of IP.
     pub async fn connect(self, address: SocketAddr) -> io::Result<TcpStream> {
         if address.is_ipv6() != self.is_six {
             return Self::of_other_version(self.is_six).fail();
         }
+        // A mapped address such as `::ffff:10.0.0.1` is reached over IPv4, which `IPV6_V6ONLY` excludes.
         if self.settings().is_only_six && unmapped(address).is_ipv4() {
             return Errno::NetworkUnreachable.fail();
         }
@@ -163,6 +164,7 @@ impl TcpSocket {
     /// [`io::ErrorKind::AddrInUse`] if another socket listens at the address.
     pub fn listen(self, backlog: u32) -> io::Result<TcpListener> {
         let mut settings = self.settings();
+        // Taken out, so that dropping the socket does not release the port of the listener.
         let held = match settings.bound.take() {
             Some(held) => held,
             None => self.hold_port(self.any(), &settings)?,
@@ -171,7 +173,7 @@ impl TcpSocket {
         TcpListener::listen(Arc::clone(&self.shared), self.host, held, usize::try_from(backlog).unwrap_or(usize::MAX), inherited)
     }
 
-    /// Returns the address to which the socket is bound, or the unspecified address with port 0 if it is not bound.
+    /// Returns the address of the bound socket, or the unspecified address with port 0 for a socket that is not bound.
     ///
     /// # Errors
     ///
@@ -197,7 +199,7 @@ impl TcpSocket {
     }
 }
 
-/// Getter and setter of an option that is stored.
+/// Getter and setter of a stored option.
 macro_rules! option {
     ($get:ident, $set:ident, $kind:ty, $what:literal, |$settings:ident| $read:expr, |$to:ident, $value:ident| $write:expr) => {
         #[doc = $what]
@@ -238,7 +240,7 @@ impl TcpSocket {
         reuseaddr,
         set_reuseaddr,
         bool,
-        "Whether it shares its port with others that do (`SO_REUSEADDR`), also while connections of it linger.",
+        "Whether the socket shares its port with other sockets that have this option (`SO_REUSEADDR`), also while connections linger.",
         |settings| settings.is_shared,
         |to, on| to.is_shared = on
     );
@@ -246,7 +248,7 @@ impl TcpSocket {
         only_v6,
         set_only_v6,
         bool,
-        "Whether a socket at `[::]` leaves IPv4 to others (`IPV6_V6ONLY`). With tokio this option needs `socket2`. Set the option before the socket is bound.",
+        "Whether a socket at `[::]` leaves IPv4 to other sockets (`IPV6_V6ONLY`). With tokio this option needs `socket2`. Set the option before the bind.",
         |settings| settings.is_only_six,
         |to, on| to.is_only_six = on
     );
@@ -254,13 +256,18 @@ impl TcpSocket {
         reuseport,
         set_reuseport,
         bool,
-        "Whether listeners share its port (`SO_REUSEPORT`). The option is stored and has no effect: a port has one listener.",
+        "Whether listeners share the port of the socket (`SO_REUSEPORT`). The option is stored and has no effect: a port has one listener.",
         |settings| settings.is_port_shared,
         |to, on| to.is_port_shared = on
     );
-    option!(nodelay, set_nodelay, bool, "Whether small segments leave while others are unanswered.", |settings| settings.config.nodelay, |to, on| {
-        to.config.nodelay = on
-    });
+    option!(
+        nodelay,
+        set_nodelay,
+        bool,
+        "Whether small segments leave while earlier segments are not acknowledged.",
+        |settings| settings.config.nodelay,
+        |to, on| to.config.nodelay = on
+    );
     option!(
         tos_v4,
         set_tos_v4,
@@ -281,7 +288,7 @@ impl TcpSocket {
         send_buffer_size,
         set_send_buffer_size,
         u32,
-        "The size of the send buffer \\[byte\\]: as with Linux, twice the size that was set.",
+        "The size of the send buffer \\[byte\\]: as with Linux, twice the set size.",
         |settings| told(settings.config.least_send_buffer),
         |to, size| {
             to.config.send_buffer = doubled(size, LEAST_SEND_BUFFER);
@@ -292,7 +299,7 @@ impl TcpSocket {
         recv_buffer_size,
         set_recv_buffer_size,
         u32,
-        "The size of the receive buffer \\[byte\\]: as with Linux, twice the size that was set. A size that was set stays, and is the window. The default grows \
+        "The size of the receive buffer \\[byte\\]: as with Linux, twice the set size. A set size stays, and is the window. The default grows \
          as the program reads.",
         |settings| told(settings.config.receive_buffer.unwrap_or(settings.config.least_receive_buffer)),
         |to, size| to.config.receive_buffer = Some(doubled(size, LEAST_RECEIVE_BUFFER))

@@ -135,11 +135,11 @@ macro_rules! both {
 
 pub(super) use {both, reading, writing};
 
-/// Borrowed half of a stream that reads: see [`TcpStream::split`].
+/// Borrowed reading half of a stream: see [`TcpStream::split`].
 #[derive(Debug)]
 pub struct ReadHalf<'a>(pub(super) &'a TcpStream);
 
-/// Borrowed half of a stream that writes: see [`TcpStream::split`]. Dropping this half sends nothing.
+/// Borrowed writing half of a stream: see [`TcpStream::split`]. Dropping this half sends nothing.
 #[derive(Debug)]
 pub struct WriteHalf<'a>(pub(super) &'a TcpStream);
 

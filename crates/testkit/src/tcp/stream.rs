@@ -21,18 +21,18 @@ use crate::resolve::{ToSocketAddrs, none};
 ///
 /// Differences to tokio's stream, and further properties:
 ///
-/// - A connection is opened from the host of the task that calls `connect`; [`Host::connect`](crate::Host::connect) names another host. Its port is given in
-///   turn from 49152 on, independently of the ports of UDP.
+/// - A connection is opened from the host of the task that calls `connect`; [`Host::connect`](crate::Host::connect) names another host. Ports of connections
+///   are given in turn from 49152 on, independently of the ports of UDP.
 /// - A stream that is dropped sends the bytes written so far, then FIN. If received bytes were not read, or after [`TcpStream::set_zero_linger`], the stream
 ///   sends RST instead.
 /// - As with Linux, an error of the connection is reported once, after all received bytes were read. Afterwards reads return 0 and writes
 ///   [`io::ErrorKind::BrokenPipe`].
-/// - A host that crashes tells nobody. Its peers notice when they write: after [`TcpConfig::retries`] (15 minutes) if the host stays down, or by a RST if it is
-///   up again.
-/// - A host with new addresses loses its connections: both ends are silent, and time out when they write.
+/// - A host that crashes tells nobody. The peers notice when writing: after [`TcpConfig::retries`] (15 minutes) if the host stays down, or by a RST if the host
+///   is up again.
+/// - A host with new addresses loses its connections: both ends are silent, and time out when writing.
 /// - [`TcpStream::set_linger`] has an effect with zero only, because dropping a stream takes no time.
-/// - `from_std`, `into_std` and `AsFd` are missing, because there is no socket of the operating system. The package that `cohaptic tokio` writes has them, with
-///   placeholders.
+/// - `from_std`, `into_std` and `AsFd` are missing, because there is no socket of the operating system. The package written by `cohaptic tokio` has these
+///   methods, with placeholders.
 /// - After its host has crashed, every method returns [`io::ErrorKind::ConnectionAborted`], with the way out. The same error comes from every method after the
 ///   run of the test bed has ended, also within the run of another test bed.
 /// - The stream belongs to the thread that runs the test bed. On another thread every method returns [`io::ErrorKind::Unsupported`], and the run fails.
@@ -82,9 +82,9 @@ impl TcpStream {
     /// # Errors
     ///
     /// The errors of the last tried address: [`io::ErrorKind::ConnectionRefused`] after a round trip if nobody listens there;
-    /// [`io::ErrorKind::TimedOut`] after 131 s without an answer; [`io::ErrorKind::HostUnreachable`] after 3 s if no host has the address, which is one of the
-    /// network of the hosts, 10.0.0.0/8 or `fd00::/8`; [`io::ErrorKind::NetworkUnreachable`] at once for other networks. Errors have the numbers of the system
-    /// ([`io::Error::raw_os_error`]).
+    /// [`io::ErrorKind::TimedOut`] after 131 s without an answer; [`io::ErrorKind::HostUnreachable`] after 3 s if no host has the address and the address
+    /// belongs to the network of the hosts, 10.0.0.0/8 or `fd00::/8`; [`io::ErrorKind::NetworkUnreachable`] at once for other networks. Errors have the
+    /// numbers of the system ([`io::Error::raw_os_error`]).
     ///
     /// # Panics
     ///
@@ -101,7 +101,7 @@ impl TcpStream {
     /// Opens a connection to the first address that answers. The addresses are tried in turn.
     pub(crate) async fn connect_to(shared: &Arc<Shared>, host: NodeId, addresses: Vec<SocketAddr>) -> io::Result<Self> {
         let mut failed = none();
-        // A loop and not an asynchronous closure, whose future would not be `Send` wherever this one is spawned.
+        // A loop, and no asynchronous closure: the future of a closure would not be `Send`, and a program may spawn this future on tokio.
         for address in addresses {
             let config = shared.with(|core| core.tcp_config(host).clone());
             let connected = match Self::connect_on(Arc::clone(shared), host, None, address, config) {
@@ -171,8 +171,8 @@ impl TcpStream {
         }
     }
 
-    /// Returns the figures of the connection: its state, round trips, timeout, congestion window and retransmissions. After the end of the run the figures are
-    /// those of the end.
+    /// Returns the figures of the connection: state, round trips, timeout, congestion window and retransmissions. After the end of the run the figures stay as
+    /// at the end.
     ///
     /// # Panics
     ///
@@ -191,7 +191,7 @@ impl TcpStream {
         self.open(|core| core.take_error_of(self.id))?
     }
 
-    /// Copies received bytes without taking them from the stream. Waits until there are any.
+    /// Copies received bytes without taking the bytes from the stream. Waits until bytes are there.
     ///
     /// # Errors
     ///
@@ -244,7 +244,7 @@ impl TcpStream {
 }
 
 impl TcpStream {
-    /// Sends FIN after the bytes written so far, for a half that is dropped. On another thread this is left to the thread of the run.
+    /// Sends FIN after the bytes written so far, for a half that is dropped. On another thread the act is left to the thread of the run.
     #[cfg(feature = "tokio")]
     pub(super) fn let_write_half_go(&self) {
         let id = self.id;

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use cohaptic_units::parse;
 
-/// Name of the environment variable that sets how long anything in a test bed may run without returning to it. It takes precedence over the limits of the
-/// tests. Its value is a span such as `10min`, or `off`.
+/// Name of the environment variable for the time that a task or node may run without returning to the test bed. The variable takes precedence over the limits
+/// of the tests. The value is a span such as `10min`, or `off`.
 pub const STALL_VARIABLE: &str = "COHAPTIC_TEST_STALL";
 
 /// Returns the limit from the environment, otherwise the limit `said` by the test.

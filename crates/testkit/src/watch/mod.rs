@@ -1,7 +1,7 @@
 //! Watchdog by the wall clock: a thread that checks now and then whether tasks and nodes have returned to the test bed.
 //!
-//! A loop that never calls the test bed cannot be interrupted. Hence the process ends, after the task was named. The watchdog never reports a task that
-//! returns: the limits on polls and calls at one instant apply there.
+//! A loop that never calls the test bed cannot be interrupted. Hence the process ends, after the task was named. A task that returns is never reported by the
+//! watchdog: the limits on polls and calls at one instant catch such a task.
 
 mod guard;
 mod thread;
@@ -62,10 +62,11 @@ impl Runner {
 }
 
 impl Pulse {
-    /// Returns the number of a runner, the same for equal runners. Nodes need no runner: they are numbered in their order.
+    /// Returns the number of a runner, the same for equal runners. Nodes need no runner, because nodes are numbered in their order.
     pub(crate) fn number(&self, runner: Runner) -> usize {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         let Runners { all, numbers } = &mut *known;
+        // Addresses are enough for the comparison of places: a place stored twice by the compiler only has two numbers.
         *numbers.entry((runner.host, std::ptr::from_ref(runner.origin).addr())).or_insert_with(|| {
             all.push(runner);
             all.len()
@@ -96,7 +97,7 @@ impl Pulse {
         (self.turns.load(Ordering::Relaxed), self.running.load(Ordering::Relaxed))
     }
 
-    /// Returns the running task. While a panic unwinds, the task that panicked.
+    /// Returns the running task. While a panic unwinds, the result is the task that panicked.
     pub(crate) fn running(&self) -> Option<Runner> {
         self.runner(self.now().1)
     }
@@ -119,7 +120,7 @@ pub(crate) struct Watched {
     shared: OnceLock<Weak<Shared>>,
 }
 
-/// Kind of a run. While no task or node is noted as running, the kind tells whose code holds the thread, for the complaint about a run that hangs.
+/// Kind of a run. While no task or node is noted as running, the complaint about a run that hangs names the holder of the thread by the kind.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Kind {
     /// Run of nodes: the test has the thread, for as long as it wants.

@@ -34,7 +34,7 @@ struct Seen {
 static WATCH: Mutex<Watch> = Mutex::new(Watch { runs: Vec::new(), has_thread: false });
 static CHANGED: Condvar = Condvar::new();
 
-/// Watches a run until it is dropped.
+/// Watches a run until the run is dropped.
 pub(super) fn watch(run: &Arc<Watched>) {
     let mut watch = WATCH.lock().unwrap_or_else(PoisonError::into_inner);
     watch.runs.push(Seen { run: Arc::downgrade(run), turns: 0, stood: Duration::ZERO });
@@ -57,15 +57,18 @@ fn look() {
             watch = CHANGED.wait(watch).unwrap_or_else(PoisonError::into_inner);
             continue;
         };
+        // Eight looks within the shortest limit: a run is reported late by an eighth of its limit at most, unless a bound of the span applies.
         let span = (shortest / 8).clamp(SHORTEST, LONGEST);
         let (held, waited) = CHANGED.wait_timeout(watch, span).unwrap_or_else(PoisonError::into_inner);
         watch = held;
+        // A run has come, or the wake-up is spurious. Less than `span` has passed, so nothing is added to `stood`.
         if !waited.timed_out() {
             continue;
         }
         for seen in &mut watch.runs {
             let Some(run) = seen.run.upgrade() else { continue };
             let (turns, running) = run.pulse.now();
+            // A run of nodes without a running node is in the hands of the test, which may take any time.
             let is_at_rest = turns != seen.turns || running == 0 && run.kind == Kind::Nodes;
             seen.turns = turns;
             seen.stood = if is_at_rest { Duration::ZERO } else { seen.stood + span };
@@ -98,7 +101,7 @@ impl Watched {
             (Kind::Own, None) => "the function that makes the program, or a waker,".to_owned(),
             #[cfg(feature = "tokio")]
             (Kind::Tokio, None) => {
-                // Only the unstable build of tokio tells which task is polled and where it was spawned.
+                // Only the unstable build of tokio names the polled task and the place where the task was spawned.
                 "a task of `tokio::spawn` or `spawn_local`, or the function that makes the program (a task of `Host::spawn` or `Bed::spawn` would be named \
                  with its place),"
                     .to_owned()

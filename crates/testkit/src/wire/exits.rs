@@ -92,6 +92,7 @@ impl<A: Clone> Exits<A> {
         };
         let Fate::Delivered(at) = out.fate else { return Some(out) };
         match verdict {
+            // No packet with `Drop` comes out of its link: the filter of the path has dropped the packet. `Behind(0)` waits for nothing.
             Verdict::Pass | Verdict::Drop | Verdict::Behind(0) => self.arrives(out, at),
             Verdict::Delay(by) => self.arrives(out, at.saturating_add(by)),
             Verdict::Behind(count) => self.behind.entry(out.path).or_default().push((count, out)),
@@ -113,6 +114,7 @@ impl<A: Clone> Exits<A> {
                 return Some(copied);
             }
         }
+        // The verdict is carried out. Without the removal the map would grow with every hit packet.
         if verdict != Verdict::Pass {
             self.hit.remove(&key);
         }
@@ -147,7 +149,7 @@ impl<A: Clone> Exits<A> {
     }
 }
 
-/// Renumbers a copy. Without access lines the only copy is that of the link, whose number in a network is 2.
+/// Renumbers a copy. Without access lines only the link copies packets, and the network gives this copy the number 2.
 #[inline]
 pub(super) fn counted<A>(mut event: Out<A>) -> Out<A> {
     event.record.copy >>= 1;
@@ -158,7 +160,7 @@ pub(super) fn counted<A>(mut event: Out<A>) -> Out<A> {
 fn flip<A>(out: &mut Out<A>, bit: u64) {
     let bits = out.payload.bytes.len() as u64 * 8;
     let Some(bit) = bit.checked_rem(bits) else { return };
-    // A copy that shares these bytes may still be under way, undamaged.
+    // A copy with the same memory may still be under way, undamaged.
     let mut bytes = Vec::from(std::mem::take(&mut out.payload.bytes));
     if let Some(byte) = usize::try_from(bit / 8).ok().and_then(|place| bytes.get_mut(place)) {
         *byte ^= 1 << (bit % 8);

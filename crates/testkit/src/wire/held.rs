@@ -1,4 +1,4 @@
-//! Number of bytes that a run holds, and its limit.
+//! Number of bytes held by a run, and the limit of the number.
 
 use std::fmt;
 

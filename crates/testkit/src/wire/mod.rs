@@ -49,9 +49,9 @@ pub(crate) struct Wire<A> {
     cut: BTreeSet<Path>,
     /// Bytes that the run holds, on links and at sockets and nodes.
     pub(crate) held: Held,
-    /// Whether packets are hit by laws or recorded.
+    /// `true` if packets are hit by laws or recorded.
     is_watched: bool,
-    /// State of the laws that hit packets; `None` if there are no laws.
+    /// State of the laws; `None` without laws.
     hitting: Option<Box<Hitting<A>>>,
     recording: Recording,
     /// Effects of chance so far.
@@ -78,6 +78,7 @@ impl<A: HasFlow + Clone + Send + Sync + 'static> Wire<A> {
         }
         let (hitting, network) = Hitting::new(&settings.laws, names, seed, network);
         let recording = Recording::new(Arc::clone(names), settings);
+        // Without laws and without a record, `offer` and `poll` take the short way, which makes no event per packet.
         let is_watched = hitting.is_some() || recording.is_on();
         Self {
             now: Instant::ZERO,
@@ -130,6 +131,7 @@ impl<A: Clone> Wire<A> {
             let passed = self.network.handle_timeout(self.now);
             debug_assert_eq!(passed, Ok(()), "time does not go back");
         }
+        // A packet delayed by a law arrives without an event of the network, and must be polled as well.
         is_due || self.hitting.as_ref().and_then(|hitting| hitting.exits.next()).is_some_and(|at| at <= self.now)
     }
 
@@ -148,7 +150,7 @@ impl<A: Clone> Wire<A> {
         let info = PacketInfo { size: cohaptic_units::Bytes::new(parcel.bytes.len() as u64), ecn: parcel.ecn };
         let offered = self.network.handle_packet_timed(self.now, path, info, parcel);
         debug_assert!(offered.is_ok(), "hosts are checked, and time does not go back");
-        // Everything that was due before has been polled, so only this packet can have come out of its link.
+        // All events due before have been polled, so only this packet can have come out of its link.
         Ok(self.is_watched || !matches!(offered, Ok(Some(at)) if at > self.now))
     }
 
@@ -157,7 +159,7 @@ impl<A: Clone> Wire<A> {
     fn note_offer(&mut self, path: Path, parcel: &mut Parcel<A>) -> Result<(), Lost> {
         let packet = self.next_packet(path);
         if self.cut.contains(&path) {
-            // The packet does not reach the link, so it uses up none of the link's sequence numbers.
+            // The packet does not reach the link, and so uses up no sequence number of the link.
             self.note(Happening::Lost { packet, why: Lost::Cut });
             return Err(Lost::Cut);
         }
@@ -179,7 +181,7 @@ impl<A: Clone> Wire<A> {
     #[inline(always)]
     pub(crate) fn poll(&mut self) -> Option<Box<Parcel<A>>> {
         if !self.is_watched {
-            // Nothing is watched, so a packet that can only arrive needs no full event, which costs more to make.
+            // Nothing is watched, so a packet that can only arrive needs no full event. A full event costs more to make.
             let Self { network, cut, held, .. } = self;
             let arrived = network.take_mere_arrival(|event| {
                 let (path, sequence, at, mut parcel) = (event.path, event.sequence, event.at, event.payload);
@@ -188,7 +190,7 @@ impl<A: Clone> Wire<A> {
                 parcel.arrival = Arrival { packet: PacketName { path, sequence, copy: 0 }, at, marked: false, is_cut };
                 parcel
             });
-            // The event that stopped `take_mere_arrival` may be a loss or a copy, which only `poll_event` handles.
+            // The next event may be a loss or a copy. `take_mere_arrival` stops there, and only `poll_event` handles such events.
             if arrived.is_some() || !self.network.may_have_events(self.now) {
                 return arrived;
             }
@@ -218,7 +220,7 @@ impl<A: Clone> Wire<A> {
                     let (marked, is_cut) = (event.marked, self.cut.contains(&event.path));
                     let mut parcel = event.payload;
                     if let Some(damage) = &event.damage {
-                        // A copy that shares these bytes may still be under way, undamaged.
+                        // A copy with the same memory may still be under way, undamaged.
                         let mut bytes = Vec::from(std::mem::take(&mut parcel.bytes));
                         damage.apply(&mut bytes);
                         parcel.bytes = Octets::Own(bytes);
@@ -264,6 +266,7 @@ impl<A: Clone> Wire<A> {
     }
 
     pub(crate) fn set_cut(&mut self, path: Path, cut: bool) {
+        // A partition may name one host in both groups. The host still reaches itself.
         let has_changed = if cut { path.from != path.to && self.cut.insert(path) } else { self.cut.remove(&path) };
         if has_changed {
             self.note(if cut { Happening::Cut(path) } else { Happening::Mended(path) });
@@ -301,6 +304,7 @@ impl<A: Clone> Wire<A> {
 
     /// Returns the record of the run so far. Packets under way are followed to their end, for the fates only, as if nothing more were sent.
     pub(crate) fn recorded(&self) -> Recorded {
+        // Clones are followed to the end, so that the run itself stays at the present instant.
         let exits = self.hitting.as_ref().map(|hitting| hitting.exits.clone()).unwrap_or_default();
         let (packets, ended) = (self.recording.followed_through(&self.network, exits, self.now), self.now);
         Recorded {

@@ -26,13 +26,13 @@ pub(crate) struct Parcel<A> {
     pub(crate) arrival: Arrival,
 }
 
-/// Addresses of a packet that tell its flow.
+/// Addresses of a packet, which determine the flow of the packet.
 pub(crate) trait HasFlow {
     /// Returns the number of the packet's flow on a path between two hosts.
     fn flow(&self, path: Path) -> u32;
 }
 
-/// Report of a link about a packet that it has delivered.
+/// Report of a link about a delivered packet.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arrival {
     pub(crate) packet: PacketName,
@@ -53,7 +53,7 @@ impl<A> Parcel<A> {
 /// Content of a packet.
 #[derive(Clone, Debug)]
 pub(crate) enum Octets {
-    /// Content of a datagram that a socket sent. Its memory goes back to [`Spare`] when the datagram was read.
+    /// Content of a datagram sent by a socket. The memory goes back to [`Spare`] after the datagram was read.
     Own(Vec<u8>),
     /// Content of every other packet.
     Shared(Bytes),
@@ -62,7 +62,7 @@ pub(crate) enum Octets {
     Segment(Box<Whole>, usize),
 }
 
-/// Segment that travels as it is. The IP packet, with checksums, is written only for a reader of the octets: a record, a law or a damage.
+/// Segment in its parsed form. The IP packet, with checksums, is written only for a reader of the octets: a record, a law or a damage.
 #[cfg(feature = "tcp")]
 #[derive(Clone, Debug)]
 pub(crate) struct Whole {
@@ -73,6 +73,7 @@ pub(crate) struct Whole {
 #[cfg(feature = "tcp")]
 impl Whole {
     fn packet(&self) -> &Bytes {
+        // Written once, however many readers the packet has.
         self.packet.get_or_init(|| self.segment.to_packet().into())
     }
 }
@@ -134,7 +135,7 @@ impl From<Octets> for Vec<u8> {
 }
 
 impl Octets {
-    /// Returns the number of octets. The packet of a segment is not written for that.
+    /// Returns the number of octets, without writing the packet of a segment.
     #[inline]
     pub(crate) fn len(&self) -> usize {
         match self {
@@ -145,7 +146,7 @@ impl Octets {
         }
     }
 
-    /// Replaces the content with a copy of `bytes`, in memory of its own if it has some.
+    /// Replaces the content with a copy of `bytes`. Content of the kind `Own` keeps and reuses its memory.
     #[inline]
     fn refill(&mut self, bytes: &[u8]) {
         match self {
@@ -162,7 +163,7 @@ impl Octets {
     }
 }
 
-/// Read parcels, kept with memory for later packets.
+/// Parcels of packets that were read, kept with their memory for later packets.
 #[derive(Debug)]
 pub(crate) struct Spare<A>(Vec<Box<Parcel<A>>>);
 
@@ -181,7 +182,7 @@ impl<A: Default> Spare<A> {
     /// Returns a parcel with a copy of `bytes`.
     #[inline(always)]
     pub(crate) fn copied(&mut self, addresses: A, bytes: &[u8], ecn: Ecn) -> Box<Parcel<A>> {
-        // The addresses are stored directly, and passed to no further call, so that they are written only once.
+        // The addresses are stored directly, and passed to no further call: each address is written only once.
         let mut parcel = self.0.pop().unwrap_or_else(empty);
         (parcel.addresses, parcel.ecn) = (addresses, ecn);
         parcel.bytes.refill(bytes);
@@ -194,6 +195,7 @@ impl<A: Default> Spare<A> {
         let mut parcel = self.0.pop().unwrap_or_else(empty);
         (parcel.addresses, parcel.ecn) = (addresses, segment.ecn);
         match &mut parcel.bytes {
+            // A parcel that carried a segment before has a box for a segment already. The assignments reuse this memory.
             Octets::Segment(whole, length) => {
                 *length = segment.packet_length();
                 **whole = Whole { segment, packet: OnceLock::new() };
@@ -206,6 +208,7 @@ impl<A: Default> Spare<A> {
     /// Takes back a read parcel. Drops the parcel if enough are kept, and the content if shared or too long.
     #[inline]
     pub(crate) fn put(&mut self, mut parcel: Box<Parcel<A>>) {
+        // A burst must not occupy memory for the rest of the run.
         if self.0.len() >= Self::MOST {
             return;
         }

@@ -80,6 +80,7 @@ impl Recording {
         if !self.keeps_packets {
             return packets;
         }
+        // The clone runs on alone: nothing more is sent, and the network of the run stays at the present instant.
         let mut network = network.clone();
         for _ in 0..MOST_EVENTS {
             while let Some(out) = exits.poll_with(&mut network, now) {
@@ -94,6 +95,7 @@ impl Recording {
                 break;
             }
         }
+        // Without further sends the packets that wait for more arrivals never arrive, so the log reports each of them as dropped.
         packets.extend(exits.abandon(now).map(|out| seen(&out)));
         packets
     }

@@ -31,6 +31,7 @@ impl Core {
             let end = self.tcp.end_mut(id);
             end.gone.get_or_insert(gone);
             end.listener = None;
+            // A crashed host sends nothing. The peers notice the crash by their own timers, or by the reset that answers their next segment after a restart.
             silence(&mut end.machine, gone.at);
             let hold = end.hold.take();
             end.readers.wake(&mut self.woken);
@@ -43,6 +44,7 @@ impl Core {
                 self.remove_connection(id);
             }
         }
+        // Segments on the loopback of the host are in the memory of the crashed system.
         self.tcp.loopback.retain(|(of, _)| *of != host);
     }
 
@@ -51,6 +53,7 @@ impl Core {
         let gone = Gone { at: self.now(), is_killed: true };
         for id in self.listeners_of(host) {
             let listener = self.tcp.listeners.get_mut(id.0);
+            // A listener that was gone before has stopped already.
             if listener.gone.replace(gone).is_none() {
                 listener.wakers.wake(&mut self.woken);
                 self.stop_listening(id);
@@ -58,6 +61,8 @@ impl Core {
         }
         for id in self.connections_of(host) {
             let end = self.tcp.end_mut(id);
+            // Only streams in the hands of the program are closed here. Connections of the backlog ended with their listener, and dropped streams close by
+            // themselves.
             if !end.is_held || end.gone.is_some() {
                 continue;
             }
@@ -70,7 +75,7 @@ impl Core {
     }
 }
 
-/// Ends a connection without a segment to the peer: the segments of the abort are taken out and dropped.
+/// Ends a connection without a segment to the peer: the function takes out and drops the segments of the abort.
 fn silence(machine: &mut Connection, now: Instant) {
     machine.close(now);
     machine.abort();

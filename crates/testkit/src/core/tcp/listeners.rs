@@ -28,6 +28,7 @@ impl Core {
         backlog: usize,
         (config, linger): Inherited,
     ) -> io::Result<ListenId> {
+        // The port was bound without listening, so another socket that shares the port may have begun to listen in between.
         self.check_alone(host, local, hold)?;
         let id = ListenId(self.tcp.listeners.insert(Listener {
             host,
@@ -56,6 +57,7 @@ impl Core {
         let local = bound.map(|(_, local)| local);
         let any = if remote.is_ipv6() { Ipv6Addr::UNSPECIFIED.into() } else { Ipv4Addr::UNSPECIFIED.into() };
         self.note_call(|_| SocketName { kind: "TCP", host, local: local.unwrap_or_else(|| SocketAddr::new(any, 0)), peer: Some(remote) });
+        // A connection whose TIME-WAIT has ended by now must not occupy the route that this connection needs.
         self.forget_old();
         let is_six = remote.is_ipv6();
         remote = unmapped(remote);
@@ -96,6 +98,7 @@ impl Core {
         let id = self.tcp.insert(host, machine);
         let end = self.tcp.end_mut(id);
         (end.is_held, end.hold, end.is_mapped) = (true, bound.map(|(hold, _)| hold), is_mapped);
+        // No host has the address, but the network reaches the address: as in Linux, the attempt fails after the search for the owner, not at once.
         end.unreachable_at = is_nobodys.then(|| now + UNREACHABLE);
         self.after_call(id);
         Ok(id)
@@ -140,7 +143,7 @@ impl Core {
         }
     }
 
-    /// Accepts the connection that has waited longest. Returns `None` if no connection waits.
+    /// Accepts the connection with the longest wait. Returns `None` if no connection waits.
     pub(crate) fn accept(&mut self, id: ListenId) -> io::Result<Option<(ConnId, SocketAddr)>> {
         self.note_call(|core| core.tcp.listeners.get(id.0).name());
         self.check_listener(id)?;
@@ -177,7 +180,7 @@ impl Core {
         self.check_gone(listener.gone, listener.host, listener.local)
     }
 
-    /// Closes the listener, because the program has dropped it.
+    /// Closes a listener that the program has dropped.
     pub(crate) fn close_listener(&mut self, id: ListenId) {
         self.stop_listening(id);
         self.tcp.listeners.remove(id.0);

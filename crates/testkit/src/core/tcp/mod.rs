@@ -1,7 +1,7 @@
 //! TCP of a run: the connections and listeners of all hosts, around the state machines of [`cohaptic_tcp`].
 //!
-//! Each packet touches one connection, and segments leave within the call that permits them. At one instant packets arrive first, then the timers of TCP go
-//! off, sorted by host and connection, and then the timers of programs.
+//! Each packet touches one connection, and a segment leaves within the call after which the connection may send. At one instant packets arrive first, then the
+//! timers of TCP go off, sorted by host and connection, and then the timers of programs.
 
 mod faults;
 mod listeners;
@@ -59,7 +59,7 @@ pub(super) struct Tcp {
     entropy: ByHost,
     connections: Slots<Box<End>>,
     listeners: Slots<Listener>,
-    /// Connections that packets can find.
+    /// Connections that receive packets, by route.
     routes: BTreeMap<Route, ConnId>,
     /// Entry of `routes` that was found last.
     latest: Option<(Route, ConnId)>,
@@ -67,7 +67,7 @@ pub(super) struct Tcp {
     timers: timers::Timers,
     /// Connections in TIME-WAIT, roughly sorted by the end of TIME-WAIT. The end has no visible effect, and so is no event.
     time_waits: VecDeque<(Instant, ConnId)>,
-    /// Packets that do not leave their host, with the host, in the order of sending.
+    /// Packets from a host to itself, with the host, in the order of sending.
     loopback: VecDeque<(NodeId, Segment<'static>)>,
     /// Number of calls by programs so far. An answer to a probe of a window counts until the next call: see [`Core::is_stuck`].
     calls: u64,
@@ -86,11 +86,11 @@ struct End {
     is_write_blocked: bool,
     /// `true` if the socket of the program is of IPv6 and the packets are of IPv4: the program sees `::ffff:10.0.0.1`.
     is_mapped: bool,
-    /// Instant at which the system stops looking for the other end, if nobody has the address; `None` if a host has the address.
+    /// End of the search for the owner of the peer's address, if nobody has the address; `None` if a host has the address.
     unreachable_at: Option<Instant>,
     /// Linger time set by the program. Only zero has an effect: the connection is reset when its stream is dropped.
     linger: Option<Duration>,
-    /// Listener at which the connection waits to be accepted; `None` for other connections.
+    /// Listener of a connection that waits to be accepted; `None` after the acceptance and for opened connections.
     listener: Option<ListenId>,
     /// Port to which the socket of the connection was bound.
     hold: Option<HoldId>,
@@ -119,7 +119,7 @@ pub(in crate::core) struct Gone {
 struct Listener {
     host: NodeId,
     local: SocketAddr,
-    /// Constants that connections inherit.
+    /// Constants for the accepted connections.
     config: TcpConfig,
     linger: Option<Duration>,
     backlog: usize,
@@ -167,6 +167,7 @@ impl Tcp {
             readers: Waiters::default(),
             writers: Waiters::default(),
             is_held: false,
+            // The handshake blocks writing. `settle` wakes the writers when the connection is established.
             is_write_blocked: true,
             is_mapped: false,
             unreachable_at: None,
@@ -178,15 +179,16 @@ impl Tcp {
             is_in_time_wait: false,
             gone: None,
             counted: 0,
+            // No number of calls equals the maximum, so the first look never takes the connection for stuck.
             looked_at: (u64::MAX, None),
         })));
-        // The new connection may take the route of an old one that is the latest answer.
+        // The new connection may take the route of an old connection, which may be the latest answer.
         self.routes.insert(route, id);
         self.latest = None;
         id
     }
 
-    /// Returns the connection that packets of `route` find. Packets mostly arrive in flights of one connection, so the latest answer is tried first.
+    /// Returns the connection of `route`. Packets mostly arrive in flights of one connection, so the latest answer is tried first.
     fn routed(&mut self, route: &Route) -> Option<ConnId> {
         if let Some((_, id)) = self.latest.filter(|(latest, _)| latest == route) {
             return Some(id);
@@ -249,6 +251,7 @@ impl Core {
         let end = self.tcp.connections.get_mut(id.0);
         let held = end.machine.held() as u64;
         self.wire.held.add(Where::Streams, held);
+        // `counted` holds the share of this end in the sum, so the call replaces exactly this share.
         self.wire.held.remove(Where::Streams, std::mem::replace(&mut end.counted, held));
     }
 
@@ -262,7 +265,7 @@ impl Core {
         &self.tcp.configs[host.index()]
     }
 
-    /// Returns all ends that packets can find, sorted by host, port, address and peer.
+    /// Returns all ends with a route, sorted by host, port, address and peer.
     pub(crate) fn connections(&self) -> impl Iterator<Item = (NodeId, &Connection)> {
         self.tcp.routes.values().map(|id| self.tcp.end(*id)).map(|end| (end.host, &end.machine))
     }

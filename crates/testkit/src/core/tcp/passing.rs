@@ -20,7 +20,7 @@ impl Core {
         }
     }
 
-    /// Handles a segment that has arrived whole. A segment that carries no mark of congestion is not copied.
+    /// Handles a segment that has arrived whole. Only a segment with a mark of congestion is copied.
     fn take_segment(&mut self, host: NodeId, segment: &Segment<'_>, marked: bool) -> Result<(), Lost> {
         if !self.is_own(host, segment.destination.ip()) {
             return Err(Lost::NoSuchAddress);
@@ -62,8 +62,8 @@ impl Core {
         Err(Lost::NoSocket)
     }
 
-    /// Sends a segment of a connection, or of no connection, such as a refusal. The segment arrives when [`Core::take_arrivals`] is next called, even if its
-    /// way takes no time.
+    /// Sends a segment of a connection, or of no connection, such as a refusal. The segment arrives when [`Core::take_arrivals`] is next called, even over a
+    /// link without delay.
     fn emit(&mut self, host: NodeId, connection: Option<ConnId>, segment: Segment<'static>) {
         let (from, to) = (segment.source.ip(), segment.destination.ip());
         let path = if self.is_own(host, to) {
@@ -119,7 +119,7 @@ impl Core {
         true
     }
 
-    /// Follows up any change of a connection: segments leave, tasks that can go on are woken, and the timer of the connection is set.
+    /// Follows up any change of a connection: segments leave, tasks are woken if the change lets them go on, and the timer of the connection is set.
     pub(super) fn settle(&mut self, id: ConnId) {
         let now = self.now();
         let host = self.tcp.end(id).host;
@@ -138,6 +138,7 @@ impl Core {
         let (state, listener) = (end.machine.state(), end.listener);
         // The end of TIME-WAIT has no visible effect, so TIME-WAIT has no timer.
         let due = if state == State::TimeWait { None } else { end.machine.poll_timeout() };
+        // If nobody has the address, the attempt ends with the search for the owner, earlier than by the retransmissions of the SYN.
         let due = if state == State::SynSent { crate::wire::earlier(due, end.unreachable_at) } else { due };
         if state == State::TimeWait && !end.is_in_time_wait {
             end.is_in_time_wait = true;

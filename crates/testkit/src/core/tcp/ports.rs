@@ -1,4 +1,4 @@
-//! Ports of TCP. They are independent of the ports of UDP.
+//! Ports of TCP, independent of the ports of UDP.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -55,6 +55,7 @@ impl Hold {
 
     /// Returns whether the socket, and one at `ip` with the option `is_only_six`, have an address in common.
     fn overlaps(&self, ip: IpAddr, is_only_six: bool) -> bool {
+        // Either of the two bindings may be the binding to all addresses.
         self.covers(ip) || ip.is_unspecified() && (ip.is_ipv6() == self.ip.is_ipv6() || is_dual(ip, is_only_six))
     }
 }
@@ -120,6 +121,7 @@ impl Core {
         let port = if port == 0 {
             // A socket that hears both versions of IP needs a port that is free in both.
             let is_held = |port: u16| self.tcp.ports.at(host, port).iter().any(|hold| hold.hears(ip) || is_dual(ip, is_only_six));
+            // Accepted connections and connections in TIME-WAIT use a port without a binding.
             let free = self.tcp.ports.turn(host).find(|port| !is_held(*port) && !self.has_connections(host, *port));
             free.ok_or_else(|| self.no_port(host, io::ErrorKind::AddrInUse))?
         } else {
@@ -142,10 +144,11 @@ impl Core {
         self.tcp.ports.release(hold);
     }
 
-    /// Checks that no socket other than `id` listens at `address`.
+    /// Checks that no further socket than `id` listens at `address`.
     pub(super) fn check_alone(&self, host: NodeId, address: SocketAddr, id: HoldId) -> io::Result<()> {
         let holds = self.tcp.ports.at(host, address.port());
         let is_only_six = holds.iter().any(|hold| hold.number == id.number && hold.is_only_six);
+        // A shared port may have several bound sockets, but one listener per address.
         let is_taken = holds.iter().any(|hold| hold.number != id.number && hold.listener.is_some() && hold.overlaps(address.ip(), is_only_six));
         if is_taken { Errno::AddrInUse.fail() } else { Ok(()) }
     }

@@ -28,7 +28,7 @@ impl End {
         }
     }
 
-    /// Returns an address of this end as the program sees it.
+    /// Returns an address of this end in the form for the program.
     pub(super) fn shown(&self, address: SocketAddr) -> SocketAddr {
         if self.is_mapped { mapped(address) } else { address }
     }
@@ -60,8 +60,8 @@ impl Core {
         [end.machine.local_addr(), end.machine.peer_addr()].map(|address| end.shown(address))
     }
 
-    /// Returns what would not block now, as the `poll` of Linux tells: reading, writing, the end of reading, and the end of writing. Writing has ended when
-    /// both directions have: after a shutdown of the own direction alone the system does not tell so.
+    /// Returns the operations that would not block now, as in the `poll` of Linux: reading, writing, the end of reading, and the end of writing. Linux reports
+    /// the end of writing only when both directions have ended, not after a shutdown of the own direction alone.
     #[cfg(feature = "facade")]
     pub(crate) fn readiness(&self, id: ConnId) -> [bool; 4] {
         let [readable, writable] = self.is_ready(id);
@@ -153,12 +153,14 @@ impl Core {
                 break;
             }
         }
+        // As with the edge of `epoll`, the end counts as blocked only after a write was refused, and `settle` ends this state.
         end.is_write_blocked |= outcome == Err(Error::WouldBlock);
         self.after_call(id);
         if self.wire.held.is_too_much() {
             self.fail_for(self.tcp.end(id).name());
         }
         match outcome {
+            // Bytes written before the error are reported first. The next write returns the error.
             Err(error) if count == 0 => Err(self.tcp.end(id).explain(error)),
             _ => Ok(count),
         }
@@ -167,6 +169,7 @@ impl Core {
     /// Returns whether [`Core::read`] and [`Core::write`] would return at once.
     pub(crate) fn is_ready(&self, id: ConnId) -> [bool; 2] {
         let end = self.tcp.end(id);
+        // The next call returns the error of the crash or kill at once.
         if end.gone.is_some() { [true; 2] } else { [end.machine.is_readable(), !end.is_write_blocked] }
     }
 
@@ -193,11 +196,12 @@ impl Core {
         &mut self.tcp.end_mut(id).linger
     }
 
-    /// Releases the stream, because the program has dropped it.
+    /// Releases a stream that the program has dropped.
     pub(crate) fn drop_connection(&mut self, id: ConnId) {
         let now = self.now();
         let end = self.tcp.end_mut(id);
         end.is_held = false;
+        // Nobody waits for a dropped stream. A later wake would only poll a task in vain.
         end.readers.clear();
         end.writers.clear();
         // The crash has ended the connection already. After a kill the connection may still have to exchange its last segments with the peer.

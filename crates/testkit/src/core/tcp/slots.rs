@@ -1,4 +1,4 @@
-//! Array of values with stable indices, which are used again after a removal.
+//! Array of values with stable indices. An index is used again after the removal of its value.
 
 /// Values with indices. The index of a value stays the same until the value is removed.
 #[derive(Debug)]

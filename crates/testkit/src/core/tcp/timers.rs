@@ -58,6 +58,7 @@ impl Tcp {
 
     /// Returns all deadlines, in their order.
     fn all_timers(&mut self) -> Vec<(Instant, NodeId, ConnId)> {
+        // Entries before their deadline are moved first, so that every entry tells the true deadline.
         let old: Vec<_> = self.timers.0.iter().filter(|(at, _, id)| self.end(*id).due != Some(*at)).map(|(.., id)| *id).collect();
         old.into_iter().for_each(|id| self.move_entry(id));
         self.timers.0.iter().copied().collect()
@@ -68,24 +69,24 @@ impl Core {
     /// Returns the next event. `others` is the next event of the network and of the timers of programs.
     pub(in crate::core) fn with_tcp_timers(&mut self, others: Option<Instant>) -> Option<Instant> {
         let first = self.tcp.first_timer().map(|(at, _)| at);
-        // Only probes of stuck connections are left. They would let time pass for ever, so the run counts as having no event.
+        // Only probes of stuck connections are left. The probes would let time pass for ever, so the run counts as having no event.
         match (first, others) {
             (Some(_), None) if self.is_stuck() => None,
             _ => crate::wire::earlier(first, others),
         }
     }
 
-    /// Returns whether no connection can make progress by itself. The caller has checked that no packet is on its way and no program waits for time. A
-    /// connection is stuck if its only timers probe a window that the program of the peer keeps closed, or ask whether the peer is there, and the peer has
-    /// answered since a program last called.
+    /// Returns whether no connection can make progress by itself. The caller has checked that no packet is under way and no program waits for time. A
+    /// connection is stuck if its only timers are probes of a window kept closed by the program of the peer, or keep-alive probes, and the peer has answered
+    /// since a program last called.
     ///
-    /// A connection must have been seen twice with a different deadline since the last call: the deadline moves when a probe was answered.
+    /// A connection must have been seen twice with different deadlines since the last call: the deadline moves when a probe was answered.
     fn is_stuck(&mut self) -> bool {
         let calls = self.tcp.calls;
         let mut is_stuck = true;
         for (at, _, id) in self.tcp.all_timers() {
             let end = self.tcp.end_mut(id);
-            // A connection that no program holds gives up by itself, so it is not stuck.
+            // A connection without a program gives up by itself, and so is not stuck.
             let is_answered = end.is_held && (end.machine.is_held_by_window() || end.machine.is_only_kept_alive());
             if !is_answered || end.looked_at.0 != calls {
                 end.looked_at = (calls, Some(at));
@@ -109,6 +110,7 @@ impl Core {
             return;
         }
         while let Some((_, id)) = self.tcp.first_timer().filter(|(at, _)| *at <= now) {
+            // The deadline has passed. If `settle` sets no new deadline, the next call of `first_timer` removes the entry.
             self.tcp.set_timer(id, None);
             let end = self.tcp.end_mut(id);
             end.machine.handle_timeout(now);
@@ -126,6 +128,7 @@ impl Core {
         let now = self.now();
         while let Some((_, id)) = self.tcp.time_waits.front().copied().filter(|(ends, _)| *ends <= now) {
             self.tcp.time_waits.pop_front();
+            // The connection may be gone already, and its index may belong to a newer connection.
             let Some(end) = self.tcp.connections.find(id.0) else { continue };
             match end.machine.time_wait_ends().filter(|_| end.is_in_time_wait) {
                 // A repeated FIN has restarted TIME-WAIT.

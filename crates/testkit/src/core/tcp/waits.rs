@@ -1,4 +1,4 @@
-//! Descriptions of what tasks wait for at TCP sockets. Reported when programs wait for ever.
+//! Descriptions of the waits of tasks at TCP sockets. Reported when programs wait for ever.
 
 use std::task::Waker;
 
@@ -16,7 +16,7 @@ impl Core {
         listeners.chain(ends)
     }
 
-    /// Returns a line for each TCP socket for which a task waits, or whose data waits for the program of the peer to read.
+    /// Returns a line for each TCP socket with a waiting task, or with data that the program of the peer does not read.
     pub(in crate::core) fn tcp_waits(&self) -> impl Iterator<Item = String> {
         let names = self.plan.names();
         let listeners = self.tcp.listeners.iter().map(|(_, listener)| listener).filter(|listener| !listener.wakers.is_empty());
@@ -25,6 +25,7 @@ impl Core {
         let connections = self.tcp.connections.iter().filter_map(|(_, end)| {
             let is_held_back = end.machine.is_held_by_window();
             let waits = match (end.readers.is_empty(), end.writers.is_empty()) {
+                // Also without a waiting task, held-back data explains why a run never ends.
                 (true, true) if !is_held_back => return None,
                 (true, true) => "holds data",
                 (false, true) => "waits to read",
@@ -36,6 +37,7 @@ impl Core {
             let (local, peer) = (end.machine.local_addr(), end.machine.peer_addr());
             let mut text = format!("host `{}`: TCP {local} to {peer} ({:?}) {waits}", names[end.host.index()], info.state);
             if is_held_back {
+                // Each host has its own loopback, so the reader is a task of the same host.
                 let reader = if peer.ip().is_loopback() { Some(end.host) } else { self.plan.owner_node(peer.ip()) };
                 let reader = reader.map_or("?", |host| &names[host.index()]);
                 text.push_str(&format!("; {} octets wait, because the program of host `{reader}` does not read", info.unacknowledged));

@@ -1,4 +1,4 @@
-//! Direction of a Unix stream, or a pipe: the written and unread bytes, and the tasks that wait at both ends.
+//! Direction of a Unix stream, or a pipe: the written and unread bytes, and the waiting tasks at both ends.
 //!
 //! The limits are those of Linux 6.18, measured by writing pieces of one size until the system refuses. A stream counts the memory of each piece
 //! (`unix_stream_sendmsg`, `SKB_TRUESIZE`), so that many small writes fill a stream with fewer bytes than few large writes. A pipe counts pages (`pipe_write`).
@@ -22,7 +22,7 @@ const PAGE: usize = 4096;
 /// Pages of a pipe: `PIPE_DEF_BUFFERS`.
 const PAGES: usize = 16;
 
-/// Kind of a channel, which decides how much it holds.
+/// Kind of a channel, which decides how many bytes the channel holds.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Law {
     Stream,
@@ -134,12 +134,14 @@ impl Channel {
     pub(super) fn put(&mut self, buffers: &[IoSlice<'_>], woken: &mut Woken) -> Option<usize> {
         let joined;
         let bytes = match buffers {
+            // A single buffer needs no copy. Several buffers are joined, because the pieces of a write do not depend on its division into buffers.
             [one] => &one[..],
             more => {
                 joined = more.iter().flat_map(|buffer| buffer.iter().copied()).collect::<Vec<u8>>();
                 &joined
             }
         };
+        // As with Linux, an empty write to a stream or a pipe does nothing.
         if bytes.is_empty() {
             return Some(0);
         }
@@ -210,7 +212,7 @@ pub(super) const fn pages_of(bytes: usize) -> usize {
     bytes.next_multiple_of(PAGE)
 }
 
-/// Returns the memory of a buffer of `bytes` in one block \[byte\]: 256 for the description, and the power of two that holds the bytes and 320 more.
+/// Returns the memory of a buffer of `bytes` in one block \[byte\]: 256 for the description, and the next power of two for the bytes and 320 more.
 pub(super) fn buffer_cost(bytes: usize) -> usize {
     256 + (bytes + 320).next_power_of_two()
 }

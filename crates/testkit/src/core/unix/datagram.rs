@@ -39,7 +39,7 @@ struct Datagram {
 enum Peer {
     Nobody,
     Socket(UnixId),
-    /// The peer is gone, and the next call that sends says so.
+    /// The peer is gone, and the next send returns the error.
     Gone,
 }
 
@@ -49,7 +49,7 @@ pub(super) struct Datagrams {
     pub(super) name: UnixName,
     peer: Peer,
     inbox: VecDeque<Datagram>,
-    /// Memory of the datagrams that this socket has sent and nobody has received \[byte\].
+    /// Memory of the datagrams from this socket that nobody has received \[byte\].
     sent: usize,
     /// Whether a datagram was refused because `sent` was too large.
     is_blocked: bool,
@@ -58,13 +58,13 @@ pub(super) struct Datagrams {
     pub(super) readers: Waiters,
     /// Tasks that wait until this socket may send.
     pub(super) writers: Waiters,
-    /// Tasks of other sockets that wait until `inbox` has room.
+    /// Tasks of senders, waiting for room in `inbox`.
     room: Waiters,
     pub(super) gone: Option<Gone>,
 }
 
 impl Datagrams {
-    /// Returns whether a datagram of `sender` finds no room. There is no limit between two sockets that are connected to each other.
+    /// Returns whether a datagram of `sender` finds no room. Between two sockets that are connected to each other there is no limit.
     fn is_full_for(&self, sender: UnixId) -> bool {
         self.peer != Peer::Socket(sender) && self.inbox.len() > QUEUE
     }
@@ -95,6 +95,7 @@ impl Unix {
 
     /// Frees the memory of a datagram, and wakes its sender when three quarters are free (`unix_writable`).
     fn credit(&mut self, datagram: &Datagram, woken: &mut Woken) {
+        // The sender may be gone by now.
         let Some(sender) = self.datagrams.get_mut(&datagram.sender) else { return };
         sender.sent -= datagram.cost;
         if sender.is_blocked && sender.sent * 4 <= SEND_BUFFER {
@@ -106,7 +107,7 @@ impl Unix {
     /// Takes a socket out of the reach of other sockets: frees the name, drops the datagrams, and ends the connections to the socket.
     pub(super) fn leave(&mut self, id: UnixId, woken: &mut Woken) {
         let socket = self.socket_mut(id);
-        // The socket of a crashed host has left already, and another one may have the name by now.
+        // The socket of a crashed host has left already, and another socket may have the name by now.
         if socket.gone.is_some() {
             return;
         }
@@ -151,7 +152,7 @@ impl Core {
         id
     }
 
-    /// Creates two sockets that are connected to each other.
+    /// Creates two connected sockets.
     pub(crate) fn unix_datagram_pair(&mut self, host: NodeId) -> [UnixId; 2] {
         let [one, other] = [self.unix_datagrams(host), self.unix_datagrams(host)];
         self.unix.socket_mut(one).peer = Peer::Socket(other);
@@ -178,7 +179,7 @@ impl Core {
         Ok(())
     }
 
-    /// Sends a datagram. Returns [`io::ErrorKind::WouldBlock`] if there is no room, and wakes `waker` when there is.
+    /// Sends a datagram. Returns [`io::ErrorKind::WouldBlock`] if there is no room, and wakes `waker` when room is free.
     pub(crate) fn send_unix(&mut self, id: UnixId, waker: Option<&Waker>, bytes: &[u8], to: Option<&UnixName>) -> io::Result<usize> {
         self.check_unix_datagrams(id)?;
         let socket = self.unix.socket_mut(id);
@@ -193,11 +194,13 @@ impl Core {
             (None, Peer::Socket(to)) => to,
             (None, Peer::Nobody) => return Errno::NotConnected.fail(),
             (None, Peer::Gone) => {
+                // As with Linux, the refusal is reported once. Afterwards the socket is not connected.
                 socket.peer = Peer::Nobody;
                 return Errno::ConnectionRefused.fail();
             }
         };
         let socket = self.unix.socket_mut(id);
+        // As with the edge of `epoll`, a refused sender stays refused until `credit` has found three quarters of the memory free.
         if socket.is_blocked || socket.sent >= SEND_BUFFER {
             socket.is_blocked = true;
             waker.into_iter().for_each(|waker| socket.writers.wait(waker));
@@ -208,6 +211,7 @@ impl Core {
         if other.receives_no_more {
             return Errno::BrokenPipe.fail();
         }
+        // As with Linux, a socket that sends to itself is not refused for a full queue.
         if target != id && other.is_full_for(id) {
             waker.into_iter().for_each(|waker| other.room.wait(waker));
             return Err(io::ErrorKind::WouldBlock.into());
@@ -219,7 +223,7 @@ impl Core {
         Ok(bytes.len())
     }
 
-    /// Receives a datagram. Returns [`io::ErrorKind::WouldBlock`] if there is none, and wakes `waker` when one comes.
+    /// Receives a datagram. Returns [`io::ErrorKind::WouldBlock`] if no datagram waits, and wakes `waker` when a datagram comes.
     pub(crate) fn receive_unix(&mut self, id: UnixId, waker: Option<&Waker>, buffer: &mut [u8]) -> io::Result<(usize, UnixName)> {
         self.check_unix_datagrams(id)?;
         let socket = self.unix.socket_mut(id);
@@ -241,6 +245,7 @@ impl Core {
     pub(crate) fn unix_datagrams_ready(&mut self, id: UnixId, waker: Option<&Waker>) -> io::Result<Ready> {
         self.check_unix_datagrams(id)?;
         let socket = self.unix.socket(id);
+        // As in `unix_dgram_poll`, a full peer makes a connected socket unwritable. An unconnected socket has no single receiver to look at.
         let full = match socket.peer {
             Peer::Socket(peer) if peer != id && self.unix.socket(peer).is_full_for(id) => Some(peer),
             Peer::Nobody | Peer::Socket(_) | Peer::Gone => None,
@@ -279,6 +284,7 @@ impl Core {
     pub(crate) fn shut_unix_datagrams(&mut self, id: UnixId, how: Shutdown) -> io::Result<()> {
         self.check_unix_datagrams(id)?;
         let socket = self.unix.socket_mut(id);
+        // A shutdown answers waits of both kinds, so every waiting task is woken and looks again.
         socket.receives_no_more |= matches!(how, Shutdown::Read | Shutdown::Both);
         socket.sends_no_more |= matches!(how, Shutdown::Write | Shutdown::Both);
         socket.readers.wake(&mut self.woken);

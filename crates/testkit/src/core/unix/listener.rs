@@ -34,11 +34,13 @@ impl Unix {
     /// `EAGAIN` if too many connections wait: as with Linux, a Unix socket that does not block is not made to wait for the listener.
     pub(super) fn offer(&mut self, listener: UnixId, from: UnixId, woken: &mut Woken) -> io::Result<()> {
         let at = self.listeners.get(&listener).expect("a name belongs to a listener as long as the listener lives");
+        // As with TCP, Linux lets one connection more wait than the backlog.
         if at.waiting.len() > at.backlog {
             return Errno::TryAgain.fail();
         }
         let (host, name) = (at.host, at.name.clone());
         let accepted = self.insert(host, Law::Stream, name);
+        // Both directions exist before the listener accepts: as with Linux, the connecting program may write at once.
         self.join(from, accepted);
         self.join(accepted, from);
         let at = self.listeners.get_mut(&listener).expect("it was found above");
@@ -80,14 +82,14 @@ impl Core {
         let host = self.unix.end_mut(id).host;
         self.drop_unix(id);
         let id = self.unix.number();
-        // The name was the stream's until the line above.
+        // The name belonged to the stream until `drop_unix` above freed the name.
         self.unix.bind(host, &name, Owner::Listener(id))?;
         let listener = Listener { host, name, backlog, waiting: VecDeque::new(), wakers: Waiters::default(), gone: None };
         self.unix.listeners.insert(id, listener);
         Ok(id)
     }
 
-    /// Accepts a connection. If none waits, `waker` is woken when one comes.
+    /// Accepts a connection. If no connection waits, `waker` is woken when a connection comes.
     pub(crate) fn accept_unix(&mut self, id: UnixId, waker: &Waker) -> Poll<io::Result<UnixId>> {
         self.check_unix_listener(id)?;
         let listener = self.unix.listeners.get_mut(&id).expect("it was found above");

@@ -1,7 +1,7 @@
 //! Unix sockets and pipes of a run, in memory: no packet touches a link, and bytes arrive at the instant of the write.
 //!
-//! Names belong to a host: two hosts that bind the same path have two sockets. Everything a call does is over when the call returns, and tasks are woken in the
-//! order in which they began to wait, so that a run repeats itself.
+//! Names belong to a host: two hosts that bind the same path have two sockets. All effects of a call are over when the call returns, and tasks are woken in the
+//! order of the beginnings of their waits, so that a run repeats itself.
 
 mod channel;
 mod datagram;
@@ -103,6 +103,7 @@ impl Core {
     pub(super) fn end_unix(&mut self, host: NodeId, gone: Gone) {
         let unix = &mut self.unix;
         let woken = &mut self.woken;
+        // The numbers are collected first, because closing an end changes the maps. Sorted maps give every run the same order of waking.
         let ends: Vec<UnixId> = unix.ends.iter().filter(|(_, end)| end.host == host && end.gone.is_none()).map(|(id, _)| *id).collect();
         for id in ends {
             unix.close(id, woken);
@@ -114,6 +115,7 @@ impl Core {
         for id in listeners {
             unix.stop_listening(id, woken);
             if let Some(listener) = unix.listeners.get_mut(&id) {
+                // The first cause stays: a crash after a kill does not change the error.
                 listener.gone.get_or_insert(gone);
             }
         }

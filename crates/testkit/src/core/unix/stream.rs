@@ -77,7 +77,7 @@ impl Unix {
         if let Some(id) = incoming
             && let Some(channel) = self.channels.get_mut(&id)
         {
-            // As with Linux, an end that closes with unread bytes resets the peer, which reads `ECONNRESET`.
+            // As with Linux, an end that closes with unread bytes resets the peer: the peer reads `ECONNRESET`.
             is_unread = !channel.is_empty();
             channel.clear();
             channel.is_unread = true;
@@ -120,7 +120,7 @@ impl Core {
         self.unix.insert(host, Law::Stream, UnixName::Unnamed)
     }
 
-    /// Creates two streams that are connected to each other.
+    /// Creates two connected streams.
     pub(crate) fn unix_pair(&mut self, host: NodeId) -> [UnixId; 2] {
         let ends = [self.unix_stream(host), self.unix_stream(host)];
         self.unix.join(ends[0], ends[1]);
@@ -128,7 +128,7 @@ impl Core {
         ends
     }
 
-    /// Creates a pipe: the end that writes, and the end that reads.
+    /// Creates a pipe: the writing end, and the reading end.
     pub(crate) fn pipe(&mut self, host: NodeId) -> [UnixId; 2] {
         let ends = [(); 2].map(|()| self.unix.insert(host, Law::Pipe, UnixName::Unnamed));
         self.unix.join(ends[0], ends[1]);
@@ -213,6 +213,7 @@ impl Core {
         if !channel.is_empty() {
             return Ok(channel.take(buffers, &mut self.woken));
         }
+        // As with Linux, the reset is reported once, after all bytes. Afterwards the stream has ended.
         if std::mem::take(&mut channel.is_reset) {
             return Errno::ConnectionReset.fail();
         }

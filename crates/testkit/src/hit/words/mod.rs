@@ -92,6 +92,7 @@ pub(crate) fn push_number(ranges: &mut Vec<RangeInclusive<u64>>, number: u64) {
 
 /// Parses the hits in a part of a line: at least one hit, separated by semicolons.
 pub(crate) fn parse(line: &str, part: Range<usize>) -> Result<Vec<Hit>, Fault> {
+    // A missing word is marked right after the last word, not after blanks at the end.
     let end = part.start + line[part.clone()].trim_end().len();
     let mut reader = Reader { line, words: tokens(line, part)?, next: 0, end };
     let mut hits = Vec::new();
@@ -105,7 +106,7 @@ pub(crate) fn parse(line: &str, part: Range<usize>) -> Result<Vec<Hit>, Fault> {
     }
 }
 
-/// Splits a part of a line into words. A text in quotes is a single word, and so is a semicolon.
+/// Splits a part of a line into words. A text in quotes is a single word, and a semicolon is a word of its own.
 fn tokens(line: &str, part: Range<usize>) -> Result<Vec<Range<usize>>, Fault> {
     let mut tokens: Vec<Range<usize>> = Vec::new();
     let mut rest = part.start;
@@ -120,6 +121,7 @@ fn tokens(line: &str, part: Range<usize>) -> Result<Vec<Range<usize>>, Fault> {
         } else if let Some(quoted) = text.strip_prefix('"') {
             quoted.find('"').map(|end| end + 2).ok_or_else(|| (rest..part.end, "expected a quotation mark at the end of the text".to_owned()))?
         } else {
+            // A semicolon ends a word also without a blank before the semicolon.
             text.find(|c: char| c.is_whitespace() || c == ';').unwrap_or(text.len())
         };
         tokens.push(rest..rest + len);
@@ -187,6 +189,7 @@ impl<'a> Reader<'a> {
             _ => Some(ordinal(word).ok_or_else(|| (span, format!("unknown word \"{word}\": expected {WHICH}")))?),
         };
         let (word, span) = self.expect(EXPECTED_KINDS)?;
+        // `syn` is as clear as `SYN`.
         let kind = KINDS.iter().find(|(name, _)| name.eq_ignore_ascii_case(word));
         let &(_, kind) = kind.ok_or_else(|| (span, format!("unknown word \"{word}\": expected {EXPECTED_KINDS}")))?;
         let mut with = Vec::new();

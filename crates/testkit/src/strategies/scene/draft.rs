@@ -179,6 +179,7 @@ impl Draft {
     #[must_use]
     pub fn to_toml(&self) -> String {
         let mut text = String::new();
+        // `{:?}` prints a number with as many digits as the same number needs to be read back.
         let Self { duration, seed, axes, mass, damping, split_mass, gains, update, .. } = self;
         let mut line = |content: String| {
             text.push_str(&content);

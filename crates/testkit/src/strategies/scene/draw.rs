@@ -49,6 +49,7 @@ pub(super) fn draft(peers: usize, dice: &mut Dice<'_>) -> Draft {
     if dice.one_in(4) {
         draft.integrator = Some((dice.pick("semi-implicit-euler", &["rk4"]), 1 + u32::try_from(dice.below(4)).unwrap_or(0)));
     }
+    // Hands are drawn last: contacts need the number of axes, and the phase of a peer lies within one period of sending.
     let (axes, ticks) = (draft.axes, draft.update / 1_000);
     draft.peers.iter_mut().for_each(|peer| touch(peer, axes, ticks, dice));
     draft

@@ -72,6 +72,7 @@ pub(super) fn knobs(draft: &Draft) -> Vec<Knob> {
 
 impl Knob {
     pub(super) fn number(self, draft: &Draft) -> Option<Number> {
+        // The accessors borrow mutably, also for reading, so the number is read from a copy.
         let mut draft = draft.clone();
         let (value, goal, step) = match self {
             Self::Duration => (draft.duration, 100, 1),

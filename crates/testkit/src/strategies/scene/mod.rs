@@ -1,7 +1,7 @@
 //! Random scenes of coordination, which shrink to the calmest scene on which a test still fails.
 //!
-//! [`any_scene`] draws scenes of 2 to 6 peers, [`scenes_like`] scenes whose links are within [`LinkBounds`]. An [`AnyScene`] is printed as TOML text that can
-//! be saved as a scene file. The scenes may be unstable.
+//! [`any_scene`] draws scenes of 2 to 6 peers, [`scenes_like`] scenes with links within [`LinkBounds`]. An [`AnyScene`] is printed as the TOML text of a scene
+//! file. The scenes may be unstable.
 //!
 //! ```
 //! use cohaptic_testkit::proptest::test_runner::{TestCaseError, TestError, TestRunner};
@@ -52,7 +52,7 @@ use super::space::{LinkSpace, NetworkSpace};
 pub use draft::{Draft, DraftHand, DraftLink, DraftPeer, Place, contact_to_toml};
 use space::SceneSpace;
 
-/// Random scene. `Display` and `Debug` print its TOML text.
+/// Random scene. `Display` and `Debug` print the TOML text.
 #[derive(Clone, PartialEq)]
 pub struct AnyScene {
     /// The scene without its links.
@@ -79,7 +79,7 @@ impl AnyScene {
         draft
     }
 
-    /// Returns the links between the peers, which are numbered in their order.
+    /// Returns the links between the peers. Peers are numbered in the order of the draft.
     #[must_use]
     pub const fn network(&self) -> &ImpairedNetwork {
         &self.network
@@ -89,7 +89,7 @@ impl AnyScene {
     ///
     /// # Errors
     ///
-    /// None for a drawn scene; the type is that of the reader.
+    /// Never for a drawn scene. The type is the type of errors of the reader.
     pub fn read(&self) -> Result<Scene, SceneError> {
         self.draft().read()
     }
@@ -143,6 +143,7 @@ impl Strategy for Scenes {
         let draft = draw::draft(peers, &mut dice);
         let network = Networks::within(peers, &self.bounds).new_tree(runner)?.current();
         let scene = AnyScene { draft, network };
+        // A scene that the reader refuses is no input: proptest then draws another scene.
         scene.read().map_err(|error| error.to_string())?;
         let space = SceneSpace { least: self.least, network: NetworkSpace(LinkSpace(Arc::clone(&self.bounds))) };
         Ok(Box::new(Search::new(space, scene)))

@@ -25,7 +25,7 @@ pub(super) enum Part {
     Network(NetworkPart),
 }
 
-/// Section in which a scene or a peer differs from a calm one.
+/// Section of a scene or of a peer that may differ from the calm scene.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Section {
     Walls,
@@ -96,6 +96,7 @@ impl SceneSpace {
     /// Returns the sections that are not calm.
     fn sections(scene: &AnyScene) -> Vec<Part> {
         let draft = &scene.draft;
+        // A section that is calm already is no part, because its removal would change nothing.
         let of_scene = OF_SCENE.into_iter().filter(|section| scene.with_draft(|draft| calm_scene(draft, *section)) != *scene).map(Part::Section);
         let of_peer = draft.peers.iter().enumerate().flat_map(|(place, peer)| {
             let is_there = move |section: &Section| {
@@ -130,7 +131,7 @@ impl Space for SceneSpace {
         let mut links = Vec::new();
         for part in parts {
             match part {
-                // A peer is found by name, because the removal of another peer has moved the indexes.
+                // A peer is found by name, because the removal of another peer has moved the indices.
                 Part::Peer(name) => {
                     let place = less.draft.peers.iter().position(|peer| peer.name == *name)?;
                     if less.draft.peers.len() == self.least {
@@ -144,6 +145,7 @@ impl Space for SceneSpace {
                 Part::Network(part) => links.push(*part),
             }
         }
+        // All parts of the network are removed in one call, because the network expects the stages of a link side by side.
         if !links.is_empty() {
             less.network = self.network.without(&less.network, &links)?;
         }
@@ -164,6 +166,7 @@ impl Space for SceneSpace {
                     peer.hand = match peer.hand {
                         DraftHand::None => DraftHand::None,
                         DraftHand::Force(force) | DraftHand::Sine { amplitude: force, .. } => DraftHand::Force(force),
+                        // An arm has no force by itself. One newton on the first axis keeps the hand active.
                         DraftHand::Arm { .. } => DraftHand::Force([1.0, 0.0, 0.0]),
                     };
                 }

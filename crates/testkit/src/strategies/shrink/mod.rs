@@ -6,7 +6,7 @@
 //! 1. *Parts*, level by level (the peers of a scene, the links of a network, the stages of a link): all at once, then halves, halves of halves, and single
 //!    parts.
 //! 2. *Forms*: each form becomes plainer by itself, in the order in which the space lists the forms.
-//! 3. *Numbers*, one after the other, towards the least impairing value. That value is tried first. Bisection follows among numbers of one significant digit,
+//! 3. *Numbers*, one after the other, towards the least impairing value, which is tried first. Bisection follows among numbers of one significant digit,
 //!    then among numbers of two digits between the last number that passed and the first number that failed. If the number drawn is not round and no round
 //!    number fails, the digits increase further.
 //!
@@ -69,7 +69,7 @@ impl<S: Space> Search<S> {
         }
     }
 
-    /// Proceeds to the next candidate, and skips candidates that have been tried. Returns whether there is one.
+    /// Proceeds to the next candidate, and skips candidates that have been tried. Returns whether a candidate is left.
     fn advance(&mut self) -> bool {
         while let Some(candidate) = self.propose() {
             if candidate == self.best || self.passed.contains(&candidate) {
@@ -87,6 +87,7 @@ impl<S: Space> Search<S> {
     fn propose(&mut self) -> Option<S::Value> {
         loop {
             let (space, best) = (&self.space, &self.best);
+            // Every candidate is a change of the best value so far, so accepted changes add up.
             let found = match &mut self.phase {
                 Phase::Parts { parts, .. } => parts.propose(|parts| space.without(best, parts)),
                 Phase::Forms(forms) => forms.by_ref().find_map(|form| space.plainer(best, &form)),
@@ -106,7 +107,9 @@ impl<S: Space> Search<S> {
         self.phase = match &self.phase {
             Phase::Parts { level, .. } if level + 1 < S::LEVELS => parts(level + 1),
             Phase::Parts { .. } => Phase::Forms(space.forms(best).into_iter()),
+            // After the first round most numbers cannot shrink further, so one try per number is enough to see whether a number still can.
             Phase::Forms(_) => Phase::Numbers(Numbers::new(space.places(best), self.round > 0)),
+            // A smaller number may let a part go that had to stay before, so the phases begin again after every round with progress.
             Phase::Numbers(_) if self.progress => {
                 self.progress = false;
                 self.round += 1;
@@ -133,6 +136,7 @@ impl<S: Space> ValueTree for Search<S> {
     }
 
     fn simplify(&mut self) -> bool {
+        // `simplify` is the only report of proptest that the property has failed with the current value.
         Searching::failed();
         if let Some(failed) = self.trial.take() {
             self.best = failed;

@@ -3,11 +3,11 @@
 use super::space::{Number, Space};
 use crate::strategies::grid::{is_round, next_towards, round_between};
 
-/// Numbers of a value, which shrink one after the other.
+/// Numbers of a value. The numbers shrink in sequence.
 #[derive(Clone, Debug)]
 pub(super) struct Numbers<P> {
     places: std::vec::IntoIter<P>,
-    /// `true` if a number is left as it is if the test passes with the next round number.
+    /// `true` if a number stays unchanged when the test passes with the next round number.
     only_nearest: bool,
     /// Number that shrinks now.
     now: Option<(P, Bisection)>,
