@@ -89,7 +89,7 @@ impl Setup {
     /// If there is no such host, both hosts are the same, or the words describe no link.
     pub(crate) fn set_link(&mut self, from: &str, to: &str, link: impl ToLink) {
         let path = self.names.path(from, to);
-        assert!(path.from != path.to, "{} `{from}` has no link to itself", self.noun);
+        assert!(path.from != path.to, "{noun} `{from}` has no link to itself; name two {noun}s", noun = self.noun);
         self.set_path(path, link);
     }
 
@@ -178,7 +178,7 @@ impl Setup {
 
     fn hit_path(&self, [from, to]: [&str; 2]) -> Path {
         let path = self.names.path(from, to);
-        assert!(path.from != path.to, "host `{from}` has no link to itself");
+        assert!(path.from != path.to, "host `{from}` has no link to itself; name two hosts");
         path
     }
 }

@@ -137,7 +137,7 @@ pub struct Elapsed;
 
 impl fmt::Display for Elapsed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("the time was up")
+        f.write_str("the time was up before the future was ready")
     }
 }
 
@@ -177,7 +177,7 @@ pub async fn timeout<F: Future>(span: Duration, future: F) -> Result<F::Output, 
 /// Outside a running test bed, and with a period of zero.
 #[must_use]
 pub fn interval(period: Duration) -> Interval {
-    assert!(!period.is_zero(), "an interval with a period of zero would never let time pass: expected a period above zero");
+    assert!(!period.is_zero(), "an interval with a period of zero never lets time pass: give a period above zero");
     let shared = context::ask("time passes", Arc::clone);
     let next = shared.now();
     Interval { shared, next, period }

@@ -79,7 +79,7 @@ impl Testbed {
     /// white space).
     pub fn new<N: Into<String>>(hosts: impl IntoIterator<Item = N>) -> Self {
         let names: Names = hosts.into_iter().collect();
-        assert!(!names.is_empty(), "a test bed without hosts: expected at least one name");
+        assert!(!names.is_empty(), "the test bed has no hosts: give at least one name");
         Self {
             setup: Setup::new("host", names),
             #[cfg(feature = "tcp")]

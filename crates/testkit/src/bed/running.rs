@@ -127,7 +127,7 @@ impl Bed {
     /// If there is no such host, if both hosts are the same, or if the words describe no link.
     pub fn set_link(&self, from: &str, to: &str, link: impl ToLink) {
         let path = self.names().path(from, to);
-        assert!(path.from != path.to, "host `{from}` has no link to itself");
+        assert!(path.from != path.to, "host `{from}` has no link to itself; name two hosts");
         let link = link.to_link();
         self.shared.with(|core| core.set_link(path, link));
     }
@@ -203,7 +203,7 @@ impl Bed {
 
 #[expect(clippy::panic, reason = "a misuse, and the way out")]
 fn unreachable_link(host: &str) -> LinkStats {
-    panic!("host `{host}` has no link to itself")
+    panic!("host `{host}` has no link to itself; name two hosts")
 }
 
 impl fmt::Debug for Bed {

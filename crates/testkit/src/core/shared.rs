@@ -205,7 +205,7 @@ impl Shared {
     #[inline(always)]
     pub(super) fn ask<T>(&self, visit: Option<Visit<'_>>, ask: impl FnOnce(&mut Core) -> T) -> T {
         let (outcome, woken) = HERE.with_borrow_mut(|here| {
-            let core = here.as_mut().expect("it was brought here");
+            let core = here.as_mut().expect("the state was brought here");
             (ask(core), core.woken.take())
         });
         // The state goes home before the wakers run: a waker may ask the state.
@@ -244,7 +244,7 @@ impl Shared {
             visit.other = HERE.with_borrow_mut(|here| std::mem::replace(&mut **here, home.take()));
             visit.home = Some(home);
         }
-        HERE.with_borrow_mut(|here| self.follow(here.as_mut().expect("no other thread has it")));
+        HERE.with_borrow_mut(|here| self.follow(here.as_mut().expect("no other thread has the state")));
         visit
     }
 

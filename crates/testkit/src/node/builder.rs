@@ -156,7 +156,7 @@ impl Nodes {
     }
 
     fn start_at(self, place: &Place) -> NodeRun {
-        assert!(!self.setup.names.is_empty(), "a run without nodes: `add` at least one before `start`");
+        assert!(!self.setup.names.is_empty(), "the run has no nodes: `add` at least one node before `start`");
         let seed = Seed::choose(self.setup.seed, place);
         NodeRun::new(self.setup, self.nodes, seed)
     }

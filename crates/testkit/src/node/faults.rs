@@ -52,7 +52,7 @@ impl NodeRun {
     /// If there is no such node, if both nodes are the same, or if the words describe no link.
     pub fn set_link(&mut self, from: &str, to: &str, link: impl ToLink) {
         let path = self.names.path(from, to);
-        assert!(path.from != path.to, "node `{from}` has no link to itself");
+        assert!(path.from != path.to, "node `{from}` has no link to itself; name two nodes");
         // Packets of touched nodes are sent over the old link, because the test touched the nodes before this call.
         self.ask_touched();
         self.wire.set_link(self.now(), path, link.to_link());

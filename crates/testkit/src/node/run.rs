@@ -176,7 +176,7 @@ impl NodeRun {
     #[must_use]
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub fn link_stats(&self, from: &str, to: &str) -> LinkStats {
-        self.wire.link_stats(self.names.path(from, to)).unwrap_or_else(|| panic!("node `{from}` has no link to itself"))
+        self.wire.link_stats(self.names.path(from, to)).unwrap_or_else(|| panic!("node `{from}` has no link to itself; name two nodes"))
     }
 
     /// Returns the statistics of the access lines (`Nodes::access`) of a node so far, or `None` if the node has none.
@@ -219,7 +219,12 @@ impl NodeRun {
     ///
     /// As [`NodeRun::step`]; if `until` has passed.
     pub fn run_until(&mut self, until: Instant) {
-        assert!(until >= self.now(), "cannot run until {} s: the run is already at {} s", Seconds(until), Seconds(self.now()));
+        assert!(
+            until >= self.now(),
+            "the run cannot go on until {} s: the run is already at {} s; give a later instant",
+            Seconds(until),
+            Seconds(self.now())
+        );
         self.ask_touched();
         while let Some(next) = self.next().filter(|next| *next <= until) {
             self.pass(next);
@@ -327,7 +332,7 @@ fn is_down<T>(name: &str) -> T {
 
 #[expect(clippy::panic, reason = "a misuse, and the way out")]
 pub(super) fn is_another<T>(name: &str) -> ! {
-    panic!("node `{name}` is not a `{}`", type_name::<T>())
+    panic!("node `{name}` is not a `{}`; name the type of the node that was added", type_name::<T>())
 }
 
 impl Drop for NodeRun {

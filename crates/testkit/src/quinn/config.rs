@@ -87,13 +87,13 @@ pub fn client_config() -> ClientConfig {
 #[must_use]
 #[expect(clippy::missing_panics_doc, reason = "only constants are unwrapped")]
 pub fn tls_server_config() -> TlsServer {
-    let key = PrivateKeyDer::from_pem_slice(PRIVATE_KEY.as_bytes()).expect("a constant");
+    let key = PrivateKeyDer::from_pem_slice(PRIVATE_KEY.as_bytes()).expect("the constant is a key in PEM");
     TlsServer::builder_with_details(crypto_provider(), Arc::new(TestTime))
         .with_protocol_versions(&[&TLS13])
         .expect("the provider has suites of TLS 1.3")
         .with_no_client_auth()
         .with_single_cert(vec![certificate()], key)
-        .expect("the key is the certificate's")
+        .expect("the key belongs to the certificate")
 }
 
 /// Returns the TLS configuration of [`client_config`]. The configuration resumes no session: in a program that runs twice, the second run must not begin with
@@ -102,7 +102,7 @@ pub fn tls_server_config() -> TlsServer {
 #[expect(clippy::missing_panics_doc, reason = "only constants are unwrapped")]
 pub fn tls_client_config() -> TlsClient {
     let mut roots = RootCertStore::empty();
-    roots.add(certificate()).expect("a constant");
+    roots.add(certificate()).expect("the constant is a valid certificate");
     let mut tls = TlsClient::builder_with_details(crypto_provider(), Arc::new(TestTime))
         .with_protocol_versions(&[&TLS13])
         .expect("the provider has suites of TLS 1.3")
@@ -113,5 +113,5 @@ pub fn tls_client_config() -> TlsClient {
 }
 
 fn certificate() -> CertificateDer<'static> {
-    CertificateDer::from_pem_slice(CERTIFICATE.as_bytes()).expect("a constant")
+    CertificateDer::from_pem_slice(CERTIFICATE.as_bytes()).expect("the constant is a certificate in PEM")
 }

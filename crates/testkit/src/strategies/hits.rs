@@ -51,7 +51,7 @@ pub fn any_hits<N: Into<String>, A: AsRef<str>>(
 ) -> PacketSets {
     let hosts: crate::names::Names = hosts.into_iter().collect();
     let actions: Vec<Action> = actions.into_iter().map(|words| action(words.as_ref())).collect();
-    assert!(!actions.is_empty(), "hits without actions: expected at least one action, such as `drop`");
+    assert!(!actions.is_empty(), "`any_hits` has no actions: give at least one action, such as `drop`");
     let space = SetSpace { hosts: hosts.to_vec().into(), actions: actions.into() };
     PacketSets(Sets { space, packets })
 }

@@ -100,7 +100,7 @@ impl ImpairedNetwork {
     #[must_use]
     #[track_caller]
     pub fn ideal(hosts: usize) -> Self {
-        assert!((1..=MOST).contains(&hosts), "a network of {hosts} hosts: expected 1 to {MOST} hosts");
+        assert!((1..=MOST).contains(&hosts), "a network cannot have {hosts} hosts: expected 1 to {MOST} hosts");
         Self { hosts, links: BTreeMap::new(), ideal: ImpairedLink::ideal() }
     }
 
@@ -124,7 +124,13 @@ impl ImpairedNetwork {
     #[must_use]
     #[track_caller]
     pub fn with_link(mut self, from: NodeId, to: NodeId, link: ImpairedLink) -> Self {
-        assert!(self.is_link(from, to), "there is no link from node {} to node {} among {} hosts", from.0, to.0, self.hosts);
+        assert!(
+            self.is_link(from, to),
+            "there is no link from node {} to node {}: expected two different nodes, numbered below {}",
+            from.0,
+            to.0,
+            self.hosts
+        );
         self.put(from, to, link);
         self
     }

@@ -48,7 +48,7 @@ impl Held {
     #[inline(always)]
     pub(crate) const fn remove(&mut self, place: Where, bytes: u64) {
         let held = self.of(place);
-        debug_assert!(*held >= bytes, "what goes was counted when it came");
+        debug_assert!(*held >= bytes, "removed bytes were added before");
         *held = held.saturating_sub(bytes);
     }
 

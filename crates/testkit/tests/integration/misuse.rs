@@ -170,7 +170,7 @@ fn outside_of_a_test_bed_nothing_can_be_bound_and_no_time_passes() {
 
 #[test]
 fn a_test_bed_that_is_none_is_refused_where_it_is_said() {
-    says(|| drop(Testbed::new(Vec::<String>::new())), &["without hosts"]);
+    says(|| drop(Testbed::new(Vec::<String>::new())), &["the test bed has no hosts"]);
     says(|| drop(Testbed::new(["a", "a"])), &["two hosts have the name `a`"]);
     says(|| drop(Testbed::new(["a:b"])), &["`a:b` cannot be the name of a host"]);
     says(|| drop(Testbed::new(["10.0.0.1"])), &["`10.0.0.1` cannot be the name of a host"]);

@@ -327,14 +327,14 @@ fn misuse_says_what_to_do() {
     let mut fine = run(Wrong::Answers);
     assert!(message(|| _ = fine.run_while(|_| true)).starts_with("nothing will ever happen after 0 s"));
     fine.run_until(ms(5));
-    assert_eq!(message(|| fine.run_until(ms(4))), "cannot run until 0.004 s: the run is already at 0.005 s");
+    assert_eq!(message(|| fine.run_until(ms(4))), "the run cannot go on until 0.004 s: the run is already at 0.005 s; give a later instant");
     assert_eq!(message(|| drop(fine.record())), "the run was not recorded; call `Nodes::recorded` before `start`");
     assert!(message(|| _ = fine.node::<Echo>("a")).starts_with("node `a` is not a `"));
     assert_eq!(message(|| _ = fine.counts("c")), "there is no host `c`; the hosts are a, b");
     assert!(message(|| fine.restart("a", Wrong::Answers)).contains("is up: `crash` the node before"));
     let _: Wrong = fine.crash("a");
     assert!(message(|| _ = fine.crash::<Wrong>("a")).contains("is down; `NodeRun::restart`"));
-    assert!(message(|| drop(Nodes::new().start())).contains("a run without nodes"));
+    assert!(message(|| drop(Nodes::new().start())).contains("the run has no nodes"));
     assert!(message(|| drop(Nodes::new().add("a", Wrong::Sends).add("a", Wrong::Sends))).contains("two hosts have the name `a`"));
     assert!(message(|| _ = fine.link_stats("a", "a")).contains("no link to itself"));
     let mut beats = Nodes::new().add("a", Beat(ms(0))).links("delay 3ms").time_limit(Duration::from_secs(2)).start();

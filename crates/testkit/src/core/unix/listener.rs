@@ -43,7 +43,7 @@ impl Unix {
         // Both directions exist before the listener accepts: as with Linux, the connecting program may write at once.
         self.join(from, accepted);
         self.join(accepted, from);
-        let at = self.listeners.get_mut(&listener).expect("it was found above");
+        let at = self.listeners.get_mut(&listener).expect("the listener was found above");
         at.waiting.push_back(accepted);
         at.wakers.wake(woken);
         Ok(())
@@ -92,7 +92,7 @@ impl Core {
     /// Accepts a connection. If no connection waits, `waker` is woken when a connection comes.
     pub(crate) fn accept_unix(&mut self, id: UnixId, waker: &Waker) -> Poll<io::Result<UnixId>> {
         self.check_unix_listener(id)?;
-        let listener = self.unix.listeners.get_mut(&id).expect("it was found above");
+        let listener = self.unix.listeners.get_mut(&id).expect("the listener was found above");
         if let Some(accepted) = listener.waiting.pop_front() {
             return Poll::Ready(Ok(accepted));
         }

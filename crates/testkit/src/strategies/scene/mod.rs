@@ -120,7 +120,7 @@ pub fn any_scene() -> Scenes {
 #[track_caller]
 pub fn scenes_like(peers: RangeInclusive<usize>, bounds: LinkBounds) -> Scenes {
     let (least, most) = (*peers.start(), *peers.end());
-    assert!(2 <= least && least <= most && most <= 100, "scenes of {least} to {most} peers: expected a range within 2 to 100");
+    assert!(2 <= least && least <= most && most <= 100, "scenes cannot have {least} to {most} peers: expected a range within 2 to 100 peers");
     Scenes { least, most, bounds: checked(bounds) }
 }
 

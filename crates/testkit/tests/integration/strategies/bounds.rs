@@ -176,7 +176,7 @@ fn a_strategy_within_no_bounds_is_not_made() {
 }
 
 #[test]
-#[should_panic(expected = "a network of 0 hosts: expected 1 to 1000 hosts")]
+#[should_panic(expected = "a network cannot have 0 hosts: expected 1 to 1000 hosts")]
 fn a_network_without_hosts_is_not_made() {
     let _ = networks_like(0, LinkBounds::any());
 }

@@ -127,7 +127,7 @@ fn everything_is_drawn() {
 }
 
 #[test]
-#[should_panic(expected = "scenes of 1 to 3 peers: expected a range within 2 to 100")]
+#[should_panic(expected = "scenes cannot have 1 to 3 peers: expected a range within 2 to 100 peers")]
 fn a_scene_of_one_is_not_drawn() {
     let _ = scenes_like(1..=3, LinkBounds::any());
 }
