@@ -176,6 +176,7 @@ pub(super) fn write(workspace: &Workspace, sources: &Sources) -> Result<PathBuf,
     for (path, text) in SOURCES {
         files.write(&format!("src/{path}"), &chosen(text, sources)?)?;
     }
+    // Files of an earlier version of tokio or of this program would be compiled as well.
     files.remove_others()?;
     Ok(package)
 }
@@ -185,6 +186,7 @@ fn write_real(folder: &Path, version: &str, sources: &Path, manifest: &Table) ->
     let mut manifest = manifest.clone();
     if let Some(package) = manifest.get_mut("package").and_then(Value::as_table_mut) {
         package.insert("name".to_owned(), Value::String(REAL.to_owned()));
+        // The copy is for this workspace alone and must not reach a registry.
         package.insert("publish".to_owned(), Value::Boolean(false));
         package.remove("readme");
     }
@@ -254,6 +256,7 @@ fn standing_in(version: &str, real: &Table, sockets: &str) -> String {
     let is_feature = |part: &String| features.contains_key(part) || implicit.contains(part);
     // Writing to a string does not fail.
     for (name, list) in &features {
+        // Each feature turns the feature of the same name of the real tokio on.
         let mut own = vec![format!("real/{name}")];
         own.extend(parts(list).into_iter().filter(is_feature));
         // The generated package uses these two packages itself. A feature that carries the name of the package already brings the dependency.
@@ -262,6 +265,7 @@ fn standing_in(version: &str, real: &Table, sockets: &str) -> String {
                 own.push(format!("dep:{package}"));
             }
         }
+        // Only runtimes have loopbacks.
         if name == "rt" {
             own.push("dep:loopback".to_owned());
         }

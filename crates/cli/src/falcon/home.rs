@@ -21,6 +21,7 @@ use crate::realtime::say;
 /// Waits until a user has homed the device and pulled the grip out, for at most the time of `--for`. A device that is not active by then is a failure.
 pub(super) fn home(arguments: &HomeArguments) -> Result<ExitCode, Failure> {
     let which = &arguments.which;
+    // The file is read before the device is opened, so that a missing file leaves the device alone.
     let firmware = reach::read_firmware(which.firmware.as_deref())?;
     let target = reach::target(which)?;
     let mut way = target.open().map_err(|error| Failure::System(error.to_string()))?;

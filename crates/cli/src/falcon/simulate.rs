@@ -218,6 +218,7 @@ impl Task for Simulating {
         (self.last, self.until) = (*status, at);
         self.change(at, status.phase);
         self.largest_force = self.largest_force.max(answer::length(status.force));
+        // Read in the same turn as the status, so that truth and status belong to the same exchange.
         self.truth.look(&self.simulator, status, self.origin);
         Ok(Go::On)
     }

@@ -27,6 +27,7 @@ impl Frames {
     /// Begins a part whose scene has `axes` axes. The motion of the part before is dropped.
     pub(super) fn begin(&self, part: usize, axes: usize) {
         let mut newest = self.newest();
+        // A page must not show the motion of the part before as the motion of this part.
         (newest.part, newest.axes, newest.motion) = (part, axes, None);
     }
 

@@ -154,6 +154,7 @@ impl Proofs<'_> {
             looked.map_err(|error| failed(number, error))?;
             let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
             computed += done;
+            // Fewer blocks than wanted mean that the watcher has stopped the proof. The watcher would stop the next proof as well.
             if is_broken() || done < wanted.len() as u64 {
                 break;
             }

@@ -17,8 +17,10 @@ pub(crate) struct Hosted<F> {
 }
 
 impl<F> Hosted<F> {
+    /// Drops the future as a task of the host, so that destructors of the program act on the host.
     fn let_go(&mut self) {
         if let Some(future) = self.future.take() {
+            // `within` may call the closure more than once, so the future is moved through an option.
             let mut future = Some(future);
             self.host.within(&mut || drop(future.take()));
         }
@@ -33,6 +35,7 @@ impl<F: Future> Future for Hosted<F> {
         let future = future.as_mut().expect("a future that is over is not polled again");
         let mut polled = Poll::Pending;
         host.within(&mut || polled = future.as_mut().poll(cx));
+        // Dropped at once, and not when the real tokio drops the task, which may be much later.
         if polled.is_ready() {
             self.let_go();
         }
@@ -70,8 +73,8 @@ pub(crate) fn end_with(host: &Arc<dyn Host>, task: AbortHandle) {
     host.keep(Box::new(Stopper(task)));
 }
 
-/// Starts a future by `$spawn`: as it is, or, if the present task lives on a host, as a task of that host which ends with the host. `$abort` is the handle of
-/// the started task. A macro and not a function, because the place of the call is that of the panics of the real tokio.
+/// Starts a future by `$spawn`. If the present task lives on a host, the future becomes a task of the host, and ends with the host. `$abort` is the handle of
+/// the started task. A macro and not a function, because the panics of the real tokio name the place of the call.
 macro_rules! start {
     ($future:ident, $spawn:expr, |$started:ident| $abort:expr) => {
         match cohaptic_sockets::host() {

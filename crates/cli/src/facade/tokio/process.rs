@@ -1,4 +1,4 @@
-//! Processes. A test bed refuses them: their sockets would be real.
+//! Processes. A test bed refuses processes, because the sockets of a process would be real.
 
 use std::ffi::OsStr;
 use std::future::Future;
@@ -88,6 +88,7 @@ impl Command {
 
     #[track_caller]
     fn refuse_in_bed(&self) {
+        // Asked at the start of the process and not in `new`: a command that is never started does no harm.
         if cohaptic_sockets::is_in_bed() {
             let (place, program) = (std::panic::Location::caller(), self.0.as_std().get_program());
             panic!(

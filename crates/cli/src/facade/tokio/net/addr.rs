@@ -4,13 +4,13 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, SocketAddrV4, SocketAddrV
 
 use sealed::{Described, Target};
 
-/// See `tokio::net::ToSocketAddrs`. The trait is this package's own, because the real one tells nobody the name that it is asked for.
+/// See `tokio::net::ToSocketAddrs`. The trait is this package's own, because the real trait gives away addresses only, and never the name.
 pub trait ToSocketAddrs: Described {}
 
 pub(super) mod sealed {
     use std::net::SocketAddr;
 
-    /// Address or addresses that a value describes.
+    /// Address or addresses described by a value.
     #[derive(Debug)]
     pub enum Target {
         /// One address.
@@ -28,7 +28,7 @@ pub(super) mod sealed {
     }
 }
 
-/// Calls a function of the real tokio with what a target describes.
+/// Calls a function of the real tokio with the description of a target.
 #[cfg(feature = "net")]
 macro_rules! with_real {
     ($target:expr, |$address:ident| $call:expr) => {

@@ -46,7 +46,7 @@ impl<P: Deref> BedSocket<P>
 where
     P::Target: Configured,
 {
-    /// Returns the socket without its placeholder, whose options are taken over.
+    /// Returns the socket without the placeholder, after taking over the options of the placeholder.
     pub(super) fn into_inner(self) -> P {
         self.take_over();
         self.socket
@@ -83,13 +83,13 @@ mod with_placeholder {
             if self.placeholder.get().is_none() {
                 let made = Placeholder::new(kind, &*self.socket)?;
                 self.socket.share(&made)?;
-                // Another thread may have made one in the meantime: the first one counts.
+                // Another thread may have made a placeholder in the meantime: the first placeholder counts.
                 let _ = self.placeholder.set(made);
             }
             Ok(self.placeholder.get().expect("it was made above").shown())
         }
 
-        /// Returns the placeholder in place of the socket, which is kept until the placeholder comes back.
+        /// Returns the placeholder in place of the socket. The socket is kept until the placeholder comes back.
         pub(in super::super) fn into_descriptor(self, kind: Type) -> io::Result<OwnedFd> {
             self.take_over();
             let Self { socket, placeholder } = self;
@@ -110,6 +110,7 @@ where
 
     #[inline]
     fn deref(&self) -> &P::Target {
+        // Every use of the socket passes here, so options set on the placeholder are in force before the use.
         self.take_over();
         &self.socket
     }

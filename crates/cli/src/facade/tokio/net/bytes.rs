@@ -1,7 +1,7 @@
 //! Methods that all streams of bytes have: TCP, Unix streams, and the ends of pipes. Each type has one field, an `Either` of a real stream and one of a test
 //! bed.
 
-/// Methods of what can be read.
+/// Reading methods.
 macro_rules! reads {
     () => {
         /// See the method of the same name of tokio.
@@ -40,7 +40,7 @@ macro_rules! reads {
     };
 }
 
-/// Methods of what can be written.
+/// Writing methods.
 macro_rules! writes {
     () => {
         /// See the method of the same name of tokio.
@@ -81,7 +81,7 @@ macro_rules! waits {
     };
 }
 
-/// Implements a stream, which can be read and written, and the calls of its halves, which share the stream.
+/// Implements a stream of bytes in both directions, and the calls for both halves of the stream.
 macro_rules! byte_stream {
     ($name:ident) => {
         impl $name {
@@ -221,6 +221,7 @@ macro_rules! writer {
                     let $writer = &*self;
                     $stream.shut_down_shared()
                 };
+                // After a failure the half keeps its duty, and ends the stream when the half is dropped.
                 if outcome.is_ok() {
                     let $shut = &mut *self;
                     $after;

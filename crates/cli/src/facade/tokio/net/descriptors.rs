@@ -1,4 +1,4 @@
-//! Descriptors. Those of a socket of a test bed are of its placeholder: see `placeholder`.
+//! Descriptors. A socket of a test bed gives the descriptor of its placeholder: see `placeholder`.
 
 use std::io;
 
@@ -7,7 +7,7 @@ use super::bed_socket::BedSocket;
 #[cfg(unix)]
 use super::placeholder::{self, Pointer};
 
-/// Returns the error of a real socket that is to become one of a test bed, or the other way round.
+/// Returns the error of a conversion between real sockets and sockets of a test bed.
 pub(super) fn refused(what: &str) -> io::Error {
     io::Error::new(
         io::ErrorKind::Unsupported,
@@ -115,7 +115,7 @@ macro_rules! descriptors {
             }
         }
 
-        // As the types of tokio, whose state is consistent after a panic.
+        // As with the types of tokio: the state is consistent after a panic.
         impl std::panic::UnwindSafe for $kind {}
         impl std::panic::RefUnwindSafe for $kind {}
     };

@@ -1,4 +1,4 @@
-//! Sockets. In a test bed they are those of the test bed.
+//! Sockets. In a test bed all sockets belong to the test bed.
 
 pub use real::net::*;
 
@@ -81,7 +81,7 @@ fn no_devices() -> std::io::Error {
 ///
 /// # Errors
 ///
-/// On a thread that works for a host of a test bed: the sockets of a test bed belong to the thread that runs it.
+/// On a thread that works for a host of a test bed: the sockets of a test bed belong to the thread of the run.
 #[cfg(feature = "net")]
 fn bed() -> std::io::Result<Option<std::sync::Arc<dyn cohaptic_sockets::Bed>>> {
     let bed = cohaptic_sockets::bed();

@@ -1,7 +1,7 @@
 //! Placeholders: real sockets, neither bound nor connected, that stand for sockets of a test bed where a program asks for a descriptor.
 //!
 //! A program sets options on a placeholder, as on any socket, and the socket of the test bed takes the options over. A placeholder that comes back to tokio by
-//! `from_std` becomes the socket of the test bed again. The placeholder is known by its inode, which duplicates of the descriptor share.
+//! `from_std` becomes the socket of the test bed again. The inode identifies a placeholder, because duplicates of a descriptor have the same inode.
 
 use std::any::Any;
 use std::cell::RefCell;
@@ -36,7 +36,7 @@ pub(crate) struct Placeholder {
     real: Socket,
     /// Options of `real` when they were last taken over.
     before: Mutex<Vec<Setting>>,
-    /// `true` if the program has got the descriptor since.
+    /// `true` if the program has asked for the descriptor since `before` was read.
     is_shown: AtomicBool,
 }
 
@@ -57,12 +57,13 @@ impl Placeholder {
         self.real.as_fd()
     }
 
-    /// Sets the options of `socket` that the program has set since this was last called.
+    /// Sets the options on `socket` that the program has set on the placeholder since the last call.
     pub(super) fn take_over(&self, socket: &(impl Configured + ?Sized)) {
+        // Reading all options takes a dozen calls of the system, and without a descriptor the program cannot have set any.
         if self.is_shown.swap(false, Ordering::Relaxed) {
             let now = read(&SockRef::from(&self.real));
             let before = std::mem::replace(&mut *self.before.lock().unwrap_or_else(PoisonError::into_inner), now.clone());
-            // A socket whose host has crashed takes no options, and its next call says so.
+            // A socket of a crashed host takes no options, and the next call returns the error.
             let _ = set_changed(socket, &before, now);
         }
     }
@@ -88,7 +89,7 @@ impl<T: ?Sized + 'static> Pointer for Box<T> {
     }
 }
 
-/// Keeps `socket` until its placeholder, which is returned, comes back.
+/// Keeps `socket` until the returned placeholder comes back.
 pub(super) fn keep<P: Pointer>(placeholder: Placeholder, socket: P) -> io::Result<OwnedFd> {
     let before = placeholder.before.into_inner().unwrap_or_else(PoisonError::into_inner);
     insert(placeholder.real.as_fd(), Box::new(socket), before)?;
@@ -97,10 +98,11 @@ pub(super) fn keep<P: Pointer>(placeholder: Placeholder, socket: P) -> io::Resul
 
 fn insert(fd: BorrowedFd<'_>, socket: Box<dyn Any>, before: Vec<Setting>) -> io::Result<()> {
     let (inode, bed) = (inode(fd)?, super::bed()?);
-    // After the end of the test bed nothing can come back to it.
+    // After the end of the test bed no placeholder can come back.
     let Some(bed) = bed else { return Ok(()) };
     let kept = Kept { bed: Arc::downgrade(&bed), socket, before };
     let gone: Vec<Kept> = KEPT.with_borrow_mut(|all| {
+        // Sockets of ended test beds are removed whenever the list grows, so that the list does not grow from run to run.
         let old: Vec<u64> = all.iter().filter(|(_, kept)| kept.bed.strong_count() == 0).map(|(inode, _)| *inode).collect();
         let mut gone: Vec<Kept> = old.iter().filter_map(|inode| all.remove(inode)).collect();
         gone.extend(all.insert(inode, kept));
@@ -133,6 +135,7 @@ pub(super) fn find<T: Configured + ?Sized + 'static>(real: BorrowedFd<'_>) -> io
 pub(super) fn take<T: Configured + ?Sized + 'static>(real: BorrowedFd<'_>) -> io::Result<Option<Box<T>>> {
     let inode = inode(real)?;
     let is_one = |kept: &Kept| kept.socket.is::<Box<T>>();
+    // An entry of another kind of socket stays, for a conversion to that kind.
     let kept = KEPT.with_borrow_mut(|all| if all.get(&inode).is_some_and(is_one) { all.remove(&inode) } else { None });
     let Some((socket, before)) = kept.and_then(|kept| Some((kept.socket.downcast::<Box<T>>().ok()?, kept.before))) else { return Ok(None) };
     set_changed(&**socket, &before, read(&SockRef::from(&real)))?;
@@ -159,12 +162,13 @@ fn fresh(kind: Type, version: Version) -> io::Result<Socket> {
         Version::Six => Domain::IPV6,
     };
     let real = Socket::new(domain, kind, None)?;
-    // As the sockets of tokio.
+    // As with the sockets of tokio.
     real.set_nonblocking(true)?;
     Ok(real)
 }
 
 fn inode(fd: BorrowedFd<'_>) -> io::Result<u64> {
+    // A duplicate is opened, because a `File` closes its descriptor.
     Ok(File::from(fd.try_clone_to_owned()?).metadata()?.ino())
 }
 
@@ -182,7 +186,7 @@ fn set_changed(socket: &(impl Configured + ?Sized), before: &[Setting], now: Vec
 
 /// Returns the options of a real socket. Options that this kind of socket does not have are left out.
 fn read(socket: &SockRef<'_>) -> Vec<Setting> {
-    // The version of IP is that of the address, which an unbound socket has as well.
+    // The address tells the version of IP, also for an unbound socket.
     let is_six = socket.local_addr().is_ok_and(|address| address.is_ipv6());
     let size = |size: usize| u32::try_from(size).unwrap_or(u32::MAX);
     let type_of_service = if is_six { class(socket) } else { service(socket) };

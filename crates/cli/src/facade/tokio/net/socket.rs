@@ -140,6 +140,7 @@ impl TcpSocket {
     pub async fn connect(self, address: SocketAddr) -> io::Result<TcpStream> {
         match self.0 {
             Either::Real(socket) => {
+                // A socket that `from_std_stream` has left real would connect over the network of the system.
                 refuse_real("TcpSocket::from_std_stream")?;
                 socket.connect(address).await.map(|stream| TcpStream(Either::Real(stream)))
             }
@@ -159,8 +160,8 @@ impl TcpSocket {
         }
     }
 
-    /// See `tokio::net::TcpSocket::from_std_stream`. In a test bed a new socket becomes one of the test bed, with the options that it has. A socket that is
-    /// bound or connected stays real, and neither connects nor listens.
+    /// See `tokio::net::TcpSocket::from_std_stream`. In a test bed a new socket becomes a socket of the test bed, with the same options. A bound or connected
+    /// socket stays real, and neither connects nor listens.
     #[track_caller]
     pub fn from_std_stream(stream: std::net::TcpStream) -> Self {
         #[cfg(unix)]
@@ -176,6 +177,7 @@ impl TcpSocket {
     fn of_bed(stream: &std::net::TcpStream) -> Option<Box<dyn Socket>> {
         use std::os::fd::AsFd;
         let (bed, fd) = (super::bed().ok()??, stream.as_fd());
+        // A placeholder comes back to its own socket. Any other unbound socket becomes a new socket of the test bed.
         if let Some(socket) = placeholder::take::<dyn Socket>(fd).ok()? {
             return Some(socket);
         }

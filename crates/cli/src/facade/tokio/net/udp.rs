@@ -95,10 +95,11 @@ impl UdpSocket {
         outcome
     }
 
-    /// Returns the addresses of a target in the test bed. Without a test bed, which has ended, names have no addresses.
+    /// Returns the addresses of a target in the test bed. After the end of the test bed a target has no addresses.
     fn addresses(&self, target: super::addr::sealed::Target) -> io::Result<Vec<SocketAddr>> {
         match super::bed()? {
             Some(bed) => target.addresses(&*bed),
+            // After the end of the run `local_addr` fails with the error for the program.
             None => self.local_addr().map(|_| Vec::new()),
         }
     }

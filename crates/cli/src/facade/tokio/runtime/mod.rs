@@ -2,7 +2,7 @@
 
 pub use real::runtime::*;
 
-/// Defines a runtime that holds the real one, with the methods that tokio's two kinds of runtime have alike.
+/// Defines a runtime around a real runtime, with the methods common to tokio's two kinds of runtime.
 macro_rules! runtime {
     ($name:ident) => {
         #[doc = concat!("See `tokio::runtime::", stringify!($name), "`.")]
@@ -10,7 +10,7 @@ macro_rules! runtime {
         pub struct $name {
             real: real::runtime::$name,
             handle: $crate::runtime::Handle,
-            /// Loopback of the programs that the runtime runs; `None` if their sockets are real.
+            /// Loopback of the programs on the runtime; `None` for real sockets.
             loopback: Option<loopback::loopback::Loopback>,
         }
 
@@ -38,6 +38,7 @@ macro_rules! runtime {
             #[doc = concat!("See `tokio::runtime::", stringify!($name), "::block_on`.")]
             #[track_caller]
             pub fn block_on<F: std::future::Future>(&self, future: F) -> F::Output {
+                // With a loopback every call of `block_on` is the run of a test bed.
                 match &self.loopback {
                     None => self.real.block_on(future),
                     Some(loopback) => loopback.block_on(future, |run| self.real.block_on(run)),

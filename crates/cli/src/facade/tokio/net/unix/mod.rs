@@ -1,4 +1,4 @@
-//! Unix sockets and pipes. In a test bed they live in memory, and each host has names of its own.
+//! Unix sockets and pipes. In a test bed sockets and pipes live in memory, and each host has names of its own.
 
 use std::io;
 use std::os::unix::net::SocketAddr as StdAddr;
@@ -18,7 +18,7 @@ mod stream;
 pub use halves::{OwnedReadHalf, OwnedWriteHalf, ReadHalf, ReuniteError, WriteHalf};
 pub use {datagrams::UnixDatagram, listener::UnixListener, socket::UnixSocket, stream::UnixStream};
 
-/// Refuses a descriptor of a Unix socket or of a pipe of a test bed, and one that is to become such a socket.
+/// Returns the error of a conversion between descriptors and the Unix sockets and pipes of a test bed.
 fn refused(what: &str) -> io::Error {
     io::Error::new(
         io::ErrorKind::Unsupported,
@@ -55,7 +55,7 @@ macro_rules! no_descriptors {
             }
         }
 
-        // As the types of tokio, whose state is consistent after a panic.
+        // As with the types of tokio: the state is consistent after a panic.
         impl std::panic::UnwindSafe for $name {}
         impl std::panic::RefUnwindSafe for $name {}
     };
@@ -76,7 +76,7 @@ macro_rules! try_from_std {
 }
 use try_from_std;
 
-/// Returns the name that a path stands for. As with tokio, a path that begins with a zero is a name of the abstract namespace of Linux.
+/// Returns the name for a path. As with tokio, a path that begins with a zero is a name of the abstract namespace of Linux.
 ///
 /// # Errors
 ///
@@ -130,7 +130,7 @@ fn address_of(name: &UnixName) -> io::Result<SocketAddr> {
     address.map(SocketAddr::cohaptic_of)
 }
 
-/// Credentials of this process, which runs the programs of all hosts.
+/// Returns the credentials of this process. The process runs the programs of all hosts.
 fn own_credentials() -> io::Result<UCred> {
     use std::os::unix::fs::MetadataExt;
     // A socket belongs to the user that made it.

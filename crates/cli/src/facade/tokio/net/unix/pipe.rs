@@ -1,4 +1,4 @@
-//! Pipes. In a test bed `pipe` makes one in memory. Files of the system that are pipes are refused there.
+//! Pipes. In a test bed `pipe` makes a pipe in memory, and pipes of the system are refused.
 
 use std::fs::File;
 use std::io::{self, IoSlice};
@@ -67,7 +67,7 @@ impl OpenOptions {
     }
 }
 
-/// Conversions from what may be a pipe of the system.
+/// Conversions from files and descriptors of the system.
 macro_rules! conversions {
     ($name:ident; $($function:ident($from:ty);)*) => {
         $(
