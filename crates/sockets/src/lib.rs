@@ -3,9 +3,9 @@
 //! Use this crate if you write a package that stands in for a runtime or for sockets, and the package should use the sockets of the test kit wherever a test
 //! bed runs.
 //!
-//! A package `tokio` made by `cohaptic tokio` stands in for tokio in existing programs. Each of its sockets holds a real socket, or a socket of the test bed
-//! that runs on the thread. That package asks [`bed`] which of the two a program gets. The test kit implements the traits of this crate with its own sockets,
-//! and registers each running test bed with [`enter`].
+//! A package `tokio` made by `cohaptic tokio` stands in for tokio in existing programs. Each socket of the package holds a real socket, or a socket of the
+//! running test bed of the thread. The package asks [`bed`] whether a test bed runs. The test kit implements the traits of this crate with its own sockets, and
+//! registers each running test bed with [`enter`].
 //!
 //! The crate depends on nothing, so that the test kit and the package `tokio` can both depend on it without a cycle: the test kit itself is compiled against
 //! the package `tokio`.
@@ -41,7 +41,7 @@ thread_local! {
     static RUNTIME_SEED: Cell<Option<u64>> = const { Cell::new(None) };
 }
 
-/// Sets the seed of the next runtime of tokio on this thread. From the seed, `tokio::select!` chooses where to begin.
+/// Sets the seed of the next runtime of tokio on this thread. The seed decides with which branch `tokio::select!` begins.
 pub fn seed_next_runtime(seed: u64) {
     RUNTIME_SEED.set(Some(seed));
 }
@@ -52,7 +52,7 @@ pub fn take_runtime_seed() -> Option<u64> {
     RUNTIME_SEED.take()
 }
 
-/// Call of a program that makes a socket or looks up a name, for messages.
+/// Call of a program for a socket or for the addresses of a name, for messages.
 #[derive(Clone, Copy, Debug)]
 pub struct Call {
     /// Name of the function, such as `TcpStream::connect`.
@@ -81,8 +81,8 @@ pub enum Version {
 
 /// A running test bed.
 ///
-/// Methods that make a socket make the socket on the host of the task that is being polled. Such a method panics if that task lives on no host: a program that
-/// tries again would swallow an error.
+/// New sockets belong to the host of the polled task. A method for a new socket panics if the polled task lives on no host: a program that tries again would
+/// swallow an error.
 pub trait Bed: Send + Sync {
     /// Returns the addresses of `name`, a host's name or a literal address without port.
     ///
@@ -149,26 +149,26 @@ pub trait Bed: Send + Sync {
     /// If the running task lives on no host.
     fn unix_socket(&self, call: Call) -> io::Result<Box<dyn UnixSocket>>;
 
-    /// Creates two Unix sockets of streams that are connected to each other. Errors and panics are those of [`Bed::unix_socket`].
+    /// Creates two connected Unix sockets of streams. Errors and panics as in [`Bed::unix_socket`].
     #[expect(clippy::missing_errors_doc, reason = "the errors of another method")]
     fn unix_pair(&self, call: Call) -> io::Result<[Box<dyn UnixStream>; 2]>;
 
-    /// Creates a Unix socket of datagrams that is neither bound nor connected. Errors and panics are those of [`Bed::unix_socket`].
+    /// Creates a Unix socket of datagrams that is neither bound nor connected. Errors and panics as in [`Bed::unix_socket`].
     #[expect(clippy::missing_errors_doc, reason = "the errors of another method")]
     fn unix_datagrams(&self, call: Call) -> io::Result<Box<dyn UnixDatagrams>>;
 
-    /// Creates two Unix sockets of datagrams that are connected to each other. Errors and panics are those of [`Bed::unix_socket`].
+    /// Creates two connected Unix sockets of datagrams. Errors and panics as in [`Bed::unix_socket`].
     #[expect(clippy::missing_errors_doc, reason = "the errors of another method")]
     fn unix_datagram_pair(&self, call: Call) -> io::Result<[Box<dyn UnixDatagrams>; 2]>;
 
-    /// Creates a pipe: the end that writes, and the end that reads. Errors and panics are those of [`Bed::unix_socket`].
+    /// Creates a pipe: the writing end, and the reading end. Errors and panics as in [`Bed::unix_socket`].
     #[expect(clippy::missing_errors_doc, reason = "the errors of another method")]
     fn pipe(&self, call: Call) -> io::Result<[Box<dyn ByteStream>; 2]>;
 
-    /// Returns the host of the task that is being polled, or `None` if that task lives on no host.
+    /// Returns the host of the polled task, or `None` for a task without a host.
     fn host(&self) -> Option<Arc<dyn Host>>;
 
-    /// Holds the virtual time until the value is dropped: work on another thread, which takes no virtual time, is under way.
+    /// Holds the virtual time until the value is dropped, for work on another thread. Such work takes no virtual time.
     fn hold(&self) -> Box<dyn Hold>;
 }
 
@@ -200,7 +200,7 @@ impl Drop for Entered {
     }
 }
 
-/// Returns the test bed that runs on this thread, or `None` if there is none or the thread ends.
+/// Returns the running test bed of this thread, or `None` without a test bed or while the thread ends.
 #[must_use]
 pub fn bed() -> Option<Arc<dyn Bed>> {
     // `try_with` fails only while an ending thread destroys its locals. No test bed runs on that thread any more.
@@ -210,5 +210,6 @@ pub fn bed() -> Option<Arc<dyn Bed>> {
 /// Returns whether a test bed runs on this thread.
 #[must_use]
 pub fn is_in_bed() -> bool {
+    // Unlike in `bed`, no reference is counted, because the caller needs only the answer.
     BED.try_with(|bed| bed.borrow().is_some()).unwrap_or_default()
 }

@@ -1,11 +1,11 @@
-//! Options of sockets that programs set through descriptors.
+//! Options of sockets, set by programs through descriptors.
 
 use std::io;
 use std::time::Duration;
 
 use crate::Version;
 
-/// Option of a socket with its value. Sizes of buffers are those that Linux reports: twice the size that a program has asked for.
+/// Option of a socket with its value. Sizes of buffers are sizes in the sense of Linux: twice the size given by a program.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Setting {
     /// `TCP_NODELAY`.
@@ -45,14 +45,14 @@ pub struct KeepaliveTimes {
     pub probes: u32,
 }
 
-/// Socket whose options can be set one by one.
+/// Socket with options that can be set one by one.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the methods names the errors")]
 pub trait Configured {
     /// Returns the version of IP with which the socket was made.
     fn version(&self) -> Version;
     /// Returns the options that a new socket of the system would not have. Fails as all methods of the socket do.
     fn settings(&self) -> io::Result<Vec<Setting>>;
-    /// Sets an option. An option that this kind of socket does not have, or that has no effect in a test bed, is accepted. Fails as all methods of the socket
-    /// do, and if the value is out of range.
+    /// Sets an option. An option of another kind of socket, or an option without an effect in a test bed, is accepted. Fails as all methods of the socket do,
+    /// and if the value is out of range.
     fn set(&self, setting: Setting) -> io::Result<()>;
 }

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use crate::Configured;
 
-/// Future of a connection that is being opened. `Sync`, because the future of tokio's `TcpStream::connect` is `Sync`.
+/// Future of a connection under way. `Sync`, because the future of tokio's `TcpStream::connect` is `Sync`.
 pub type Connecting = Pin<Box<dyn Future<Output = io::Result<Box<dyn Stream>>> + Send + Sync>>;
 
 /// Readiness of a socket.
@@ -107,7 +107,7 @@ pub enum Flag {
     NoDelay,
 }
 
-/// Option of a [`Socket`] whose value is a number.
+/// Option of a [`Socket`] with a number as its value.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Number {
     /// Size of the send buffer \[byte\].
