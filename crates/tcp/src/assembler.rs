@@ -12,7 +12,7 @@ use crate::sequence::Position;
 /// Entries up to which an empty queue keeps its memory.
 const KEPT: usize = 16;
 
-/// Octets in order, which the program can read, and pieces that wait for missing octets before them.
+/// Octets in order, for the program to read, and later pieces that wait for missing octets.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Assembler {
     /// Octets in order, not yet read by the program, as they arrived. No piece is empty.
@@ -77,7 +77,7 @@ impl Assembler {
         }
     }
 
-    /// Notes that the FIN at `position` has arrived out of order. It takes a position, and is acknowledged selectively with the octets before it.
+    /// Notes that the FIN at `position` has arrived out of order. The FIN takes a position, and is acknowledged selectively with the preceding octets.
     pub(crate) fn insert_fin(&mut self, position: Position) {
         self.ranges.insert(position, position + 1, |_, _| {});
         self.remember(position);

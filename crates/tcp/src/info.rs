@@ -1,4 +1,4 @@
-//! State and figures of a connection, as its owner sees them.
+//! State and figures of a connection, for the owner.
 
 use core::time::Duration;
 

@@ -13,7 +13,7 @@ pub struct TcpConfig {
     pub mtu: usize,
     /// Time to live (IPv4) or hop limit (IPv6) of the packets, not zero. Default 64.
     pub ttl: u8,
-    /// Sequence number of the SYN. `None` selects the `initial_sequence` that the constructor receives. Default `None`.
+    /// Sequence number of the SYN. `None` selects the `initial_sequence` given to the constructor. Default `None`.
     pub initial_sequence: Option<u32>,
     /// Congestion window at the beginning \[segments\] (RFC 6928), not zero. Default 10.
     pub initial_window: u32,

@@ -65,8 +65,8 @@ impl Connection {
         Segment { flags: Flags::RST | Flags::ACK, ..segment }
     }
 
-    /// Returns a segment with the positions from `start` to `end` (exclusive), which may include the FIN. The segment acknowledges all octets that have arrived
-    /// in order, so that no other acknowledgement is due afterwards.
+    /// Returns a segment with the positions from `start` to `end` (exclusive), possibly with the FIN. The segment acknowledges all octets that have arrived in
+    /// order, so that no further acknowledgement is due afterwards.
     pub(super) fn build(&mut self, now: Instant, start: Position, end: Position) -> Segment<'static> {
         // The FIN has the position after the last octet, so a position beyond the buffer is the FIN.
         let data_end = end.min(self.send.buffer.end()).max(start);

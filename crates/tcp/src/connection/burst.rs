@@ -1,4 +1,5 @@
-//! Bursts: segments that Linux hands to the network as one, and the rate that sets their length. The last segment of a burst has the flag PSH.
+//! Bursts: groups of segments that Linux hands to the network as one segment, and the rate for the length of bursts. The last segment of a burst has the flag
+//! PSH.
 
 use cohaptic_units::Instant;
 
@@ -96,8 +97,8 @@ impl Connection {
         (self.send.burst.takes(end), self.send.burst.has_several)
     }
 
-    /// Notes that the lost segment from `start` to `end` leaves again at `now`. Returns whether the segment is the last of several that Linux repeats as one:
-    /// lost neighbours that were sent in one burst, as far as the congestion window and the rate allow (`tcp_xmit_retransmit_queue`). Called before the segment
+    /// Notes that the lost segment from `start` to `end` leaves again at `now`. Returns whether the segment ends a group of segments that Linux repeats as one
+    /// segment: lost neighbours of one burst, as far as the congestion window and the rate allow (`tcp_xmit_retransmit_queue`). Called before the segment
     /// counts as sent again.
     pub(super) fn ends_repetition(&mut self, now: Instant, start: Position, end: Position) -> bool {
         if self.send.repetition.is_over(now, start) {

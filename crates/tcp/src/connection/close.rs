@@ -108,8 +108,8 @@ impl Connection {
         }
     }
 
-    /// Returns the end of TIME-WAIT, or `None` in other states. Neither the peer nor the program notices this end, so an owner may leave it out of its timers
-    /// and check it when a new connection needs the addresses.
+    /// Returns the end of TIME-WAIT, or `None` in other states. Neither the peer nor the program notices this end, so an owner may leave the end out of the
+    /// timers, and check the end when a new connection needs the addresses.
     #[must_use]
     pub fn time_wait_ends(&self) -> Option<Instant> {
         self.linger_until.filter(|_| self.state == State::TimeWait)

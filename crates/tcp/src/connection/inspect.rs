@@ -1,4 +1,4 @@
-//! Calls that report the state of a connection to its owner, and change nothing.
+//! Calls for the state of a connection. The calls change nothing.
 
 use super::Connection;
 use super::acknowledge::DUPLICATES;

@@ -61,7 +61,7 @@ pub struct Connection {
     linger_until: Option<Instant>,
     /// Purpose of the next segment sent regardless of the congestion window.
     probe: Option<Probe>,
-    /// SYNs and answers to segments that are refused, which leave before all other segments.
+    /// SYNs, and answers to refused segments. These segments leave before all data.
     replies: VecDeque<Segment<'static>>,
     /// A reset is due, which tells the peer that this end has given the connection up.
     is_reset_due: bool,
@@ -70,7 +70,7 @@ pub struct Connection {
     calls: Calls,
 }
 
-/// Calls of the program that have effects which need the time. The calls have no time of their own, but the owner calls `poll_transmit` after each of them.
+/// Calls of the program with effects that need the time. The calls have no time of their own, but the owner calls `poll_transmit` after each call.
 #[derive(Clone, Copy, Default, Debug)]
 struct Calls {
     /// Data was read.

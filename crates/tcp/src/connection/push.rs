@@ -12,7 +12,7 @@ use crate::sequence::Position;
 pub(super) struct Pushes {
     /// `true` from a write of the program until `poll_transmit` has returned all segments that may leave: Linux sends these segments within the call.
     pub(super) is_writing: bool,
-    /// Position at which the last buffer begins. Octets that were sent have left their buffer.
+    /// Position of the beginning of the last buffer. Sent octets have left the buffer.
     begin: Position,
     /// Ends of the marked buffers, in ascending order. A segment that ends at or beyond a mark has the flag PSH.
     marks: VecDeque<Position>,

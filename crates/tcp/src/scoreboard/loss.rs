@@ -33,7 +33,7 @@ impl Scoreboard {
         is_new
     }
 
-    /// Marks as lost each segment that was sent before the transmission `delivered` and at least `patience` before `now` (RFC 8985, section 6.2).
+    /// Marks as lost each segment sent before the transmission `delivered` and at least `patience` before `now` (RFC 8985, section 6.2).
     ///
     /// Returns the instant at which all other segments sent before `delivered` are lost, or `None` if no other segment is left.
     pub(crate) fn detect_by_time(&mut self, now: Instant, delivered: SentAt, patience: Duration) -> Option<Instant> {

@@ -1,4 +1,4 @@
-//! A segment with its addresses, and the reading and writing of its IP packet.
+//! Segments with addresses, and the reading and writing of IP packets.
 
 mod checksum;
 mod encode;
@@ -43,7 +43,7 @@ pub struct Segment<'a> {
 }
 
 impl Segment<'_> {
-    /// Returns the number of sequence numbers that the segment occupies: one per octet of data, one for SYN and one for FIN.
+    /// Returns the number of sequence numbers of the segment: one per octet of data, one for SYN and one for FIN.
     #[must_use]
     pub fn sequence_length(&self) -> usize {
         self.payload.len() + usize::from(self.flags.has(Flags::SYN)) + usize::from(self.flags.has(Flags::FIN))

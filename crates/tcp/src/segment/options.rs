@@ -1,4 +1,4 @@
-//! Options of the TCP header: their values, their length, and their octets.
+//! Options of the TCP header: values, length, and octets.
 
 use alloc::vec::Vec;
 

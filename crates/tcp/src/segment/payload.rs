@@ -17,13 +17,13 @@ enum Source<'a> {
 }
 
 impl Payload<'_> {
-    /// Returns the data, which is copied if it is borrowed.
+    /// Returns the data. Borrowed data is copied.
     #[must_use]
     pub fn into_owned(self) -> Payload<'static> {
         Payload(Source::Shared(self.slice(0..self.len())))
     }
 
-    /// Returns the octets of `range`, which are copied if they are borrowed.
+    /// Returns the octets of `range`. Borrowed octets are copied.
     pub(crate) fn slice(&self, range: Range<usize>) -> Bytes {
         match &self.0 {
             Source::Borrowed(octets) => Bytes::copy_from_slice(&octets[range]),
