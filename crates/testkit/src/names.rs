@@ -30,6 +30,7 @@ impl Names {
         let fault = name_fault(&name);
         assert!(fault.is_none(), "{}", fault.unwrap_or_default());
         assert!(self.list.len() < MOST_NODES, "the test bed has more than {MOST_NODES} hosts; give at most {MOST_NODES} names");
+        // The failed search returns the place that keeps `sorted` in order.
         match self.search(&name) {
             Ok(_) => panic!("two hosts have the name `{name}`: expected a name of its own for each host"),
             Err(place) => self.sorted.insert(place, NodeId::new(self.list.len())),

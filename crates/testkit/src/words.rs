@@ -174,6 +174,7 @@ impl Reader {
             }
             self.host(line, span)?;
         }
+        // From here on a misspelt name is an error, and not a further host.
         self.is_closed = true;
         Ok(())
     }

@@ -137,6 +137,7 @@ impl Core {
         if ip.is_ipv4() && Addresses::is_broadcast(*number) {
             return Ok(Receivers::All);
         }
+        // The network of the hosts swallows a datagram to an address without a host, as a real network does. To other networks there is no route.
         if self.plan.is_reachable(ip) { Ok(Receivers::Nobody) } else { Errno::NetworkUnreachable.fail() }
     }
 
@@ -161,6 +162,7 @@ impl Core {
     #[inline(never)]
     fn check_source(&self, host: NodeId, at: u32, number: u32, to: &SocketAddr) -> io::Result<()> {
         let (addresses, bound) = (self.plan.of(host), Addresses::long(at, to.is_ipv6()));
+        // As with Linux, a socket at 127.0.0.1 or `::1` reaches its own host alone.
         let stays = Addresses::is_loopback(number, to.is_ipv6()) || number == self.plan.short(host, to.is_ipv6());
         if bound.is_loopback() && !stays {
             return Errno::InvalidInput.fail();

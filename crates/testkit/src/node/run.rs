@@ -260,6 +260,7 @@ impl NodeRun {
     /// As [`NodeRun::step`]; if `is_so` is still true when nothing will happen any more, or at the [time limit](super::Nodes::time_limit).
     #[expect(clippy::panic, reason = "a test that waits for what never comes; says the way out")]
     pub fn run_while(&mut self, mut is_so: impl FnMut(&Self) -> bool) -> Instant {
+        // Asked before the first step: a condition that is false already lets no time pass.
         while is_so(self) {
             if !self.step() {
                 panic!(

@@ -37,6 +37,7 @@ fn number(netem: &Netem, stage: Stage) -> Option<u64> {
     let share = |chance: &ChanceSpec| whole(chance.percent);
     match stage {
         Stage::Limit => netem.limit.map(Into::into),
+        // `admits` checks the delay by itself, because jitter and reordering have a delay too.
         Stage::Delay => None,
         Stage::Jitter => netem.delay.as_ref().and_then(|delay| delay.jitter.as_ref()).map(|jitter| nanos(jitter.time)),
         Stage::Loss => match &netem.loss {

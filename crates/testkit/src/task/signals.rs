@@ -76,6 +76,7 @@ impl Signals for Listener {
         if std::mem::take(&mut waiting.has_come) {
             return Poll::Ready(());
         }
+        // A signal that comes from here on finds the waker, because the lock is held since the look.
         waiting.waker = Some(cx.waker().clone());
         Poll::Pending
     }

@@ -89,6 +89,7 @@ impl Recording {
                 }
                 packets.push(seen(&out));
             }
+            // Packets kept by laws have no event in the network, so both are asked for the next instant.
             let Some(next) = [network.poll_timeout(), exits.next()].into_iter().flatten().min() else { break };
             now = next;
             if network.handle_timeout(next).is_err() {

@@ -129,6 +129,7 @@ impl Core {
         let conn = self.tcp.insert(host, machine);
         let end = self.tcp.end_mut(conn);
         (end.listener, end.linger, end.is_mapped) = (Some(id), linger, is_mapped);
+        // Half-open connections do not count against the backlog, which limits complete connections.
         self.tcp.listeners.get_mut(id.0).half_open.insert(conn);
         self.settle(conn);
         Ok(())
