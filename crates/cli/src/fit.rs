@@ -59,6 +59,7 @@ fn read(arguments: &FitArguments) -> Result<Source, Failure> {
     }
     let named = |why: &dyn std::fmt::Display| Failure::Input(format!("{}: {why}", output::path(path)));
     let read_as = ReadAs { direction: arguments.direction.map(Into::into), split: arguments.split, bytes: arguments.bytes, walk: arguments.walk };
+    // A log is read line by line and may be long. Every other file is read as a whole, and gets the lower limit.
     Source::read(file::open_large(path)?, |rest| rest.limited_to(MOST_BYTES), &read_as).map_err(|error| match error {
         SourceError::Io(error) => Failure::File { verb: "read", path: path.clone(), error },
         SourceError::NotText { line } => file::not_text(path, line),

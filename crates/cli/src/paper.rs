@@ -30,6 +30,7 @@ impl Watch for Bar {
 /// Computes the claims and figures of the paper and compares them with the printed values.
 pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitCode, Failure> {
     let options = Options { quick: arguments.quick, size: arguments.pictures.size() };
+    // The folder is taken before the long computation, so that a refused folder costs no time.
     let _own = arguments.out.as_deref().map(own_folder).transpose()?;
     let bar = Bar(Progress::new(steps(options) as u64, "{bar:30} {percent:>3} %  {elapsed} passed, {eta} left"));
     let start = Clock::now();

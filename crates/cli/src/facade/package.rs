@@ -123,7 +123,7 @@ impl UCred {
         "net/unix/socketaddr.rs",
         "pub struct SocketAddr(",
         r"
-/// The address of the standard library, for the package `tokio` of `cohaptic tokio`.
+/// Conversion from an address of the standard library, for the package `tokio` of `cohaptic tokio`.
 #[doc(hidden)]
 #[allow(missing_docs)]
 impl SocketAddr {

@@ -114,6 +114,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
 /// Opens the key, the devices and the sockets before the time of the session begins. Returns `None` if the user asked for the end while waiting.
 fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent) -> Result<Option<Session>, Failure> {
     let real_time = &arguments.real_time;
+    // The key is read first: a wrong file is refused before devices are homed.
     let key = match &arguments.key_file {
         None => None,
         Some(file) => Some(SessionKey::read_from(file).map_err(|error| Failure::Input(error.to_string()))?),
@@ -128,6 +129,7 @@ fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent) -> Resu
         content,
         ..SessionConfig::new(arguments.listen)
     };
+    // Simulated devices take time to home. The sockets are opened afterwards, so that peers find a session that is about to begin.
     let Some(mut falcons) = ready_falcons(scene, arguments.firmware.as_deref(), real_time.wishes())? else { return Ok(None) };
     Session::open(scene, config, |peer| falcons.take(peer)).map(Some).map_err(refused)
 }

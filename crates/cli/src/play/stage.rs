@@ -97,6 +97,7 @@ impl PlayStage {
             beginning,
             is_guided,
             files,
+            // A later part may have more peers than this part, so there is a pointer for the greatest number.
             pointers: (0..*PEERS.end()).map(|_| Pointer::default()).collect(),
             taken: Mutex::new(vec![false; *PEERS.end()]),
             part: Mutex::new(None),

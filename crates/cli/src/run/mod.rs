@@ -183,6 +183,7 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
     };
     let start = Clock::now();
     let measures = Measures::of(scene);
+    // Only the wanted values are observed, because an observer of packets keeps the run from the fast ways of simulation.
     let (summary, measures, mut files, page) = match out {
         None => {
             let mut observer = (&mut watch, measures);

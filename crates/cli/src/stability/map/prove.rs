@@ -206,6 +206,7 @@ pub(super) fn lines(arguments: &MapArguments, proofs: &[Proof]) -> Vec<String> {
                 "  and without an area, lines at a single delay: {stable} proven stable, {unstable} proven unstable, {undecided} undecided"
             ));
         }
+        // The first proof is the one to compare with. Proven areas alone are counted, hence "at least".
         if number > 0 {
             let first = &proofs[0];
             let here = percent(both(&proof.region, Guarantee::Stable, &first.region, Guarantee::Unstable));

@@ -108,6 +108,7 @@ fn on_graph(scene: &Scene, graph: &str, path: &Path, most_memory: u64) -> Result
         "complete" => Graph::Complete,
         "ring" => Graph::Ring { neighbours: 2 },
         "star" => Graph::Star,
+        // Every other word is the path of a file.
         file => weights(Path::new(file))?,
     };
     let watch = AnalysisWatch::new(most_memory);

@@ -102,6 +102,7 @@ fn verdict(motion: &SwitchingMotion) -> String {
             growing.changes,
             growing.frames
         ),
+        // A verdict without its number is shown as undecided.
         (Guarantee::Stable | Guarantee::Unstable | Guarantee::Undecided, _, _) => {
             "undecided: no norm was found that shrinks whatever they do, and no motion that grows".to_owned()
         }

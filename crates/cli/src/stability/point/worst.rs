@@ -16,6 +16,7 @@ pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Resu
     if arguments.losses_in_a_row.is_none() && arguments.delay_within.is_none() {
         return Ok(None);
     }
+    // The comparison is false for NaN, so NaN is refused as well.
     if !(arguments.accuracy > 0.0 && arguments.accuracy.is_finite()) {
         return Err(Failure::Input(format!("--accuracy {}: expected a number above 0", arguments.accuracy)));
     }
