@@ -29,9 +29,9 @@ pub struct Errors {
 pub struct Look {
     /// Probability below the quantile of [`Errors::tail`]: 0.9999 for the delay exceeded once in ten thousand.
     pub quantile: f64,
-    /// Number of places in each cell between two entries of a table with linear interpolation.
+    /// Number of evaluated places in each cell between two entries of a table with linear interpolation.
     pub places_a_cell: u32,
-    /// Number of places on either side of the middle of a law, from 0 to 8 standard normal deviations.
+    /// Number of evaluated places on either side of the middle of a law, from 0 to 8 standard normal deviations.
     pub places_a_side: i32,
 }
 
