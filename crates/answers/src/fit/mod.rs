@@ -75,7 +75,7 @@ pub struct Answered {
     kind: Kind,
 }
 
-/// A file that a link names.
+/// File named by a key of a link, such as a table of delays.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Beside {
     /// Path of the file, in the folder of the file with the link.
@@ -165,7 +165,7 @@ impl Beside {
         Self { path: file.with_extension(extension), content }
     }
 
-    /// Returns the name by which the link finds the file: both lie in one folder.
+    /// Returns the name of the file as the value of the link's key: the file without its folder, because the file of the link lies in the same folder.
     fn name(&self) -> String {
         self.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
     }
