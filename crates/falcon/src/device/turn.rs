@@ -84,7 +84,7 @@ pub enum DeviceConfigError {
     Hold(Hold),
 }
 
-/// The loop, without its thread or ticks.
+/// State of the loop of exchanges with a device. The owner of the thread calls `exchange` and `pace` in turn.
 #[derive(Debug)]
 pub(super) struct Turns<T: Transport, const A: usize> {
     pub(super) driver: Driver<T>,
