@@ -36,7 +36,7 @@ pub(in crate::arrays) struct Broadcast<const A: usize, const L: usize> {
 enum Changed {
     Nothing,
     From(usize),
-    /// Several senders, or the means were never computed.
+    /// Samples of several senders have arrived, or the means were never computed.
     More,
 }
 
