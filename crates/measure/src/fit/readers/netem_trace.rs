@@ -26,7 +26,7 @@ enum About {
     Loss,
 }
 
-/// Turns of a configuration.
+/// Values of a configuration that hold one after the other, each for a span.
 struct Turns {
     turns: Vec<Turn>,
     forever: bool,
