@@ -608,7 +608,7 @@ pub struct ExpectMeasure {
 /// An expected mean delay of delivered packets.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ExpectDelay {
-    /// Links of the averaged delay.
+    /// Links whose delivered packets are averaged.
     pub link: LinkSelector,
     /// Least mean delay; `None` for no lower end.
     pub min: Option<Duration>,
