@@ -5,7 +5,7 @@
 //! error by about the growth of the whole frame. If disturbances grow so fast that the square of the growth says nothing, [`majorant`](super::majorant) has
 //! a closer bound.
 
-/// The numbers of the bound, updated after each tick of a frame.
+/// Growth, step and number of ticks, from which the bound follows. Updated after each tick of a frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rounding {
     /// Largest sum of absolute values of a row so far; 1 at the beginning.
