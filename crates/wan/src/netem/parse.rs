@@ -93,7 +93,7 @@ fn words(input: &str) -> impl Iterator<Item = Word<'_>> {
     })
 }
 
-/// A word for the error of a contradiction to point at.
+/// Word that the error of a contradiction marks.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Place {
     Option(Keyword),
