@@ -27,7 +27,7 @@ pub(crate) struct Judge {
     copies: Vec<Copy>,
     /// Copies that are judged together: one group of all copies or, where each peer is judged alone, a group a copy.
     groups: Vec<Group>,
-    /// Latest instant with a tick of a judged peer, which is not judged yet; `None` before the first tick.
+    /// Latest instant with a tick of a judged peer. The instant is not judged yet. `None` before the first tick.
     now: Option<Instant>,
     /// Latest instant in the sums of the copies.
     measured: Option<Instant>,
@@ -90,7 +90,7 @@ impl Judge {
         }
     }
 
-    /// Returns the instant of the outcome; `None` while there is none.
+    /// Returns the instant of the outcome; `None` before the outcome.
     pub(crate) fn ended(&self) -> Option<Instant> {
         self.outcome.map(|(_, at, _)| at)
     }
@@ -334,7 +334,7 @@ impl Judge {
         self.groups[group].reached.len().min(self.targets.len().saturating_sub(1))
     }
 
-    /// Returns what there is to see at an instant, before the instant is judged and after it is measured.
+    /// Returns the view of the task at an instant that is measured and not judged yet.
     fn seen(&self, at: Instant) -> Seen {
         let leading = self.leading();
         let (goal, target) = (self.goal_of(leading), self.target_of(leading, at));

@@ -1,4 +1,4 @@
-//! Lag of each copy: how much later the copy does what it follows, and how different it moves apart from the lag.
+//! Lag of each copy: the delay of the copy after the followed motion, and the deviation that remains apart from the lag.
 //!
 //! The target of a task that tracks is followed; in other tasks, the copy of the first peer. The position of each copy is sampled every 10 ms of the task, at
 //! the first tick at or after each such instant.
@@ -74,7 +74,7 @@ impl Following {
 }
 
 /// Returns the number of samples, at most [`MOST`], by which `followed` must be shifted to later instants for the least root mean square distance from `copy`,
-/// and this distance \[m\]. The least shift of several equal ones counts. All shifts are compared over the same samples of `copy`: those from `warm_up` and
+/// and this distance \[m\]. Among equal shifts the least counts. All shifts are compared over the same samples of `copy`: the samples from `warm_up` and
 /// from [`MOST`] on. `None` without such samples.
 #[expect(clippy::cast_precision_loss, reason = "fewer samples than 2^53")]
 fn shift(copy: &[[f64; 3]], followed: &[[f64; 3]], warm_up: usize) -> Option<(usize, f64)> {
