@@ -51,7 +51,7 @@ pub struct MovesConfig {
     pub noise: f64,
     /// Weight of the newest movement in the estimated gain, from 0 to 1. 0 for a person who takes the gain for 1 and is never surprised.
     pub learns: f64,
-    /// Delay that the person expects; `None` for the delay that the driver knows.
+    /// Delay expected by the person; `None` for the delay known to the driver.
     pub expects: Option<Duration>,
 }
 

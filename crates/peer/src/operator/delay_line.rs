@@ -26,7 +26,7 @@ impl<const A: usize> DelayLine<A> {
     #[inline]
     pub(super) fn pass(&mut self, view: &View<A>) -> View<A> {
         if self.views.is_empty() {
-            // Filled with the first view, which therefore stands for all views before it.
+            // Filled with the first view, so that the first view stands for all earlier views.
             self.views.resize(self.len, *view);
         }
         self.views[self.next] = *view;
@@ -43,7 +43,7 @@ impl<const A: usize> DelayLine<A> {
         (0..len - 1).filter_map(move |age| self.views.get((newest - age) % len))
     }
 
-    /// Replaces the views that are still to be used by `views`, the newest first. Views that are missing stand for a person who saw the origin.
+    /// Replaces the views not used yet by `views`, the newest first. Missing views stand for views of the origin.
     pub(super) fn set_waiting(&mut self, views: impl Iterator<Item = View<A>>) {
         let origin = View { position: [0.0; A], target: [0.0; A], radius: 0.0 };
         self.views.clear();

@@ -70,15 +70,15 @@ impl<const A: usize> Operator<A> {
         }
     }
 
-    /// Returns all that a person who tracks remembers: the wanted position at the next tick \[m\], and the views that are still to be used, the newest first.
-    /// No views before the first tick. `None` for a person who makes movements.
+    /// Returns the memory of a tracking person: the wanted position at the next tick \[m\], and the views not used yet, the newest first. No views before the
+    /// first tick. `None` for a person who makes movements.
     pub fn tracking(&self) -> Option<([f64; A], impl Iterator<Item = &View<A>>)> {
         let Law::Crossover(crossover) = &self.law else { return None };
         Some((crossover.position(), self.views.waiting()))
     }
 
-    /// Lets a person who tracks remember the wanted position at the next tick \[m\], and the views that are still to be used, the newest first. Views that are
-    /// missing stand for a person who saw the origin. A person who makes movements stays as before.
+    /// Sets the memory of a tracking person: the wanted position at the next tick \[m\], and the views not used yet, the newest first. Missing views stand for
+    /// views of the origin. A person who makes movements stays as before.
     pub fn set_tracking(&mut self, position: [f64; A], views: impl Iterator<Item = View<A>>) {
         let Law::Crossover(crossover) = &mut self.law else { return };
         crossover.set_position(position);

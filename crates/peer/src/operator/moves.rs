@@ -41,7 +41,7 @@ pub(super) struct Moves<const A: usize> {
     place: [f64; A],
     /// Movement under way.
     under_way: Option<Movement<A>>,
-    /// Vector of the latest movement \[m\] and the seen position at its plan \[m\]; `None` if the movement is judged.
+    /// Vector of the latest movement \[m\] and the position seen when the movement was planned \[m\]; `None` if the movement is judged.
     planned: Option<([f64; A], [f64; A])>,
     /// Number of planned movements.
     count: u64,
