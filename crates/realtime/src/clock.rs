@@ -15,7 +15,7 @@ pub trait Clock {
     /// Returns the time since the run began.
     fn now(&self) -> Instant;
 
-    /// Blocks until `until` (`None`: for ever), or until one of `readable` can be read. Returns whether one can be read. Can return early.
+    /// Blocks until `until` (`None`: for ever), or until a descriptor of `readable` can be read. Returns whether a descriptor can be read. Can return early.
     ///
     /// # Errors
     ///

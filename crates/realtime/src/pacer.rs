@@ -280,7 +280,7 @@ mod tests {
     fn rare_wake_ups_that_are_late_by_milliseconds_do_not_move_it() {
         let with_outliers = |tick: u64| if tick.is_multiple_of(10) { 3_000_000 } else { 40_500 };
         assert_eq!(lateness(Pacing::Sleep, 1000, with_outliers).1, 40);
-        // Ten of 100 are too many for a margin that must cover 98, so the margin is the longest one.
+        // Ten of 100 are too many for a margin that must cover 98, so the longest margin is chosen.
         assert_eq!(lateness(Pacing::SPIN, 1000, with_outliers).1, 120);
     }
 

@@ -57,7 +57,7 @@ pub struct Datagram<'a> {
     pub from: SocketAddr,
     /// Payload.
     pub bytes: &'a [u8],
-    /// Congestion bits; `None` if the ends do not understand them.
+    /// Congestion bits; `None` if the ends do not understand such bits.
     pub ecn: Option<Ecn>,
     /// Instant of the arrival, as seen by the kernel. If the kernel gives no time stamp: an instant no later than the reading of the datagram, and no later
     /// than the arrival of the next datagram. Never earlier than the instant of the previous datagram of the same socket.
@@ -222,7 +222,7 @@ impl UdpEndpoint {
     }
 
     /// Sends the queued datagrams in order until the kernel's buffer is full. The rest waits for the next call. A datagram that cannot be sent is counted, and
-    /// the following ones are still sent.
+    /// the following datagrams are still sent.
     ///
     /// Consecutive datagrams to one address and of one length go in one call, and the system later cuts the bytes into datagrams (segmentation offload).
     pub fn flush(&mut self) {

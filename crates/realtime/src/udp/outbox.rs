@@ -25,7 +25,7 @@ struct Entry {
     len: usize,
 }
 
-/// Datagrams that can go in one call. All are `segment` bytes long, except that the last one can be shorter.
+/// Datagrams for one call. All datagrams are `segment` bytes long; the last datagram can be shorter.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Run<'a> {
     /// Receiver of all datagrams.
@@ -59,7 +59,7 @@ impl Outbox {
         self.entries.len() - self.done
     }
 
-    /// Returns the first waiting datagram together with the following ones that can go in the same call, at most `most`, or `None` if no datagram waits.
+    /// Returns the first waiting datagram with the following datagrams for the same call, at most `most` datagrams, or `None` if no datagram waits.
     pub(super) fn next_run(&self, most: usize) -> Option<Run<'_>> {
         let waiting = &self.entries[self.done..];
         let (first, rest) = waiting.split_first()?;
