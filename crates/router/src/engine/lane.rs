@@ -12,7 +12,7 @@ use crate::packet::Packet;
 
 const IN_ORDER: &str = "the engine gives no instant before the last one it gave";
 
-/// A link in one direction, with the counters that the router keeps beside those of the link.
+/// A link in one direction, with further counters of the router beside the counters of the link.
 #[derive(Clone, Debug)]
 pub(super) struct Lane {
     pub(super) link: Link<Arc<Packet>>,

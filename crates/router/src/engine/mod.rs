@@ -28,8 +28,8 @@ pub use snapshot::{Count, Counters, LaneSnapshot, Received};
 /// State machine of a router.
 ///
 /// The driver passes packets with [`Engine::handle_packet`], asks [`Engine::poll_timeout`] for the next deadline, calls [`Engine::handle_timeout`] at that
-/// instant, and drains [`Engine::poll_departure`] after each call until it returns `None`. A late driver changes no fate, because every departure carries the
-/// instant at which the packet left its link. An instant before the latest one counts as the latest one.
+/// instant, and drains [`Engine::poll_departure`] after each call until the result is `None`. A late driver changes no fate, because every departure carries the
+/// instant at which the packet left its link. An instant before the latest instant counts as the latest instant.
 #[derive(Clone, Debug)]
 pub struct Engine {
     /// Latest instant given by the driver.

@@ -63,7 +63,7 @@ pub struct Counters {
     pub received: [Received; 2],
     /// Packets for which each rule decided, in the order of the file.
     pub by_rule: Vec<Count>,
-    /// Packets for which no rule decided, indexed by the side from which the packets came.
+    /// Packets without a deciding rule, indexed by the side of origin.
     pub by_default: [Count; 2],
     /// Directions of links in the order of the file: each link from the left and then from the right.
     pub lanes: Vec<LaneSnapshot>,

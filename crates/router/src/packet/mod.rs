@@ -111,7 +111,7 @@ impl Packet {
         }
     }
 
-    /// Flips bits of the IP packet, counted from its first bit, and corrects the checksums that cover them, so that no receiver detects the damage: see
+    /// Flips bits of the IP packet, counted from its first bit, and corrects the checksums over these bits, so that no receiver detects the damage: see
     /// [`cohaptic_wan::Checksum::Passes`]. Bits beyond the end of the packet are ignored.
     pub fn damage(&mut self, damage: &Damage) {
         // A damaged packet goes out alone and unchanged: in a segment its checksum would be computed anew.

@@ -1,5 +1,4 @@
-//! The few requests of rtnetlink (rtnetlink(7)) that a device needs: its state, the length of its packets and of its queue, its addresses, and promiscuous
-//! mode.
+//! Requests of rtnetlink (rtnetlink(7)) for a device: the state, the length of packets and of the queue, the addresses, and promiscuous mode.
 
 use core::net::IpAddr;
 use std::io;
