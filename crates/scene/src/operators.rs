@@ -1,4 +1,4 @@
-//! Operators of a scene: models of persons, what each of them sees, and the delay that each expects.
+//! Operators of a scene: models of persons, with the seen object and the expected delay of each person.
 
 use core::time::Duration;
 

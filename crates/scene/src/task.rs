@@ -8,7 +8,7 @@ use cohaptic_wan::random::{Purpose, Stream};
 
 use crate::path::PathTask;
 
-/// A task of a run. A task observes the run. It changes no motion, packet or random number of a scene without operators, who move towards its target.
+/// A task of a run. A task observes the run, and without operators changes no motion, packet or random number. Operators move towards the target of the task.
 #[derive(Clone, PartialEq, Debug)]
 pub struct TaskSpec {
     /// Kind of the task, with the keys of this kind.
@@ -39,7 +39,7 @@ pub enum TaskEnd {
 pub enum Judged {
     /// The peers whose devices touch the object at any time of the scene, judged together.
     All,
-    /// The same peers, each judged alone: the first peer whose copy does all that is asked for ends the task.
+    /// The same peers, each judged alone: the first peer whose copy fulfils the whole task ends the task.
     Any,
     /// A single peer, by the index in [`Scene::peers`](crate::Scene::peers).
     Peer(usize),

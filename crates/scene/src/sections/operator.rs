@@ -53,7 +53,7 @@ const LAWS: Choices<Law, 2> = [
     ("crossover", Law::Crossover, "continuous tracking of a moving target"),
 ];
 const SEEN: Choices<Seen, 1> = [("own", Seen::Own, "the copy of this peer")];
-/// Keys that only one of the laws takes.
+/// Keys of a single law.
 const OF_LAWS: [(&str, Law); 8] = [
     ("reaction", Law::Moves),
     ("move", Law::Moves),
