@@ -1,7 +1,7 @@
 //! Operators whose law is linear, as a scene describes them.
 //!
-//! The analysis follows the linear part of the law crossover: the seen place, the visual delay, and the velocity of the wanted place. Of the law moves it follows
-//! the arm alone, as if the wanted place stood still: movements are planned one after the other, which is not linear.
+//! The analysis follows the linear part of the law crossover: the seen place, the visual delay, and the velocity of the wanted place. Of the law moves the
+//! analysis follows the arm alone, as if the wanted place stood still: movements are planned in sequence, and such plans are not linear.
 
 use cohaptic_peer::ArmConfig;
 use cohaptic_peer::operator::{OperatorLaw, Seen};
@@ -23,7 +23,7 @@ pub(crate) struct Crossover {
 }
 
 impl Crossover {
-    /// Returns the operator that holds the device of a peer; `None` if there is none, or one with another law.
+    /// Returns the operator that holds the device of a peer; `None` without an operator, or for an operator with another law.
     pub(crate) fn of(scene: &Scene, peer: usize) -> Option<Self> {
         let (config, arm) = (scene.operator(peer)?, scene.peers[peer].hand.as_ref()?.arm()?);
         let OperatorLaw::Crossover { frequency } = config.law else { return None };

@@ -12,7 +12,7 @@
 //! solution of the equations, not the difference of two solutions, and so has no part in stability.
 //!
 //! The seen places of the latest m ticks are states. They stand beside the samples of earlier frames, as one more series of numbers: one number for each tick of
-//! the node, of which a frame uses only those that come to the hand in it.
+//! the node. A frame uses only the numbers that reach the hand within the frame.
 
 use cohaptic_peer::Gains;
 
@@ -44,7 +44,7 @@ pub enum Seen {
         /// The other node.
         from: usize,
     },
-    /// The origin, at all times. Members of a class that see one place do not differ in what they see, so their differences see nothing.
+    /// The origin, at all times. Members of a class that see one place see equal positions, so the differences of members see nothing.
     Nothing,
 }
 
@@ -114,7 +114,7 @@ impl Sight {
         newest..=self.operator.lag
     }
 
-    /// Gives the places their rows: those of earlier frames from `first_used` on, those of this frame from `first_sent` on. Returns the row after the latter.
+    /// Gives the places their rows: places of earlier frames from row `first_used` on, of this frame from row `first_sent` on. Returns the next free row.
     pub(super) const fn place(&mut self, first_used: usize, first_sent: usize) -> usize {
         (self.first_used, self.first_sent) = (first_used, first_sent);
         first_sent + self.ticks
