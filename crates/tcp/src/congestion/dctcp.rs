@@ -6,7 +6,7 @@
 
 use crate::sequence::Position;
 
-/// Number of bits behind the point of the estimate. Linux has 10, with which a share below 1/64 counts as none.
+/// Number of bits after the point of the estimate. Linux has 10 bits, so that a share below 1/64 counts as zero.
 const BITS: u32 = 20;
 
 /// Weight of the newest round in the estimate is 1/2^4 = 1/16 (RFC 8257, section 4.2, g).
