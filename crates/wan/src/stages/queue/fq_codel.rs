@@ -6,7 +6,7 @@
 //!  flow      └─ …                ─┘   old: all other queues with packets, served in turn, `quantum` bytes each
 //! ```
 //!
-//! A queue begins as a new one, and becomes an old one after its first quantum. The packet of a flow that sends rarely therefore waits only for the packet on
+//! A queue begins as a new queue, and becomes an old queue after its first quantum. The packet of a flow that sends rarely therefore waits only for the packet on
 //! the line. Where RFC 8290 leaves a choice, the choice is the choice of Linux: a full queue drops half of the bytes of the longest queue, from its head and at
 //! most 64 packets (section 4.1), and CoDel's limit of one packet is compared with the bytes of all queues together.
 
@@ -73,7 +73,7 @@ struct FlowQueue<P> {
     /// Bytes that the queue may still send in its turn. At most zero if the turn is over.
     credit: i64,
     codel: CoDelState,
-    /// `true` if the queue is in one of the lists, where it stays until it is found empty in its turn.
+    /// `true` if the queue is in a list. A queue stays in a list until its turn finds the queue empty.
     is_listed: bool,
 }
 
@@ -145,7 +145,7 @@ impl<P> FlowQueues<P> {
                 return Some(packet);
             }
             queue.codel.finds_nothing();
-            // An empty new queue passes through the old ones. A flow that sends one packet at a time would else be served before all old ones for ever.
+            // An empty new queue becomes an old queue first. Otherwise a flow with one packet at a time would be served before all old queues for ever.
             if is_new && !old.is_empty() {
                 old.push_back(number);
             } else {
