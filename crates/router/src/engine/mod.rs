@@ -28,8 +28,8 @@ pub use snapshot::{Count, Counters, LaneSnapshot, Received};
 /// State machine of a router.
 ///
 /// The driver passes packets with [`Engine::handle_packet`], asks [`Engine::poll_timeout`] for the next deadline, calls [`Engine::handle_timeout`] at that
-/// instant, and drains [`Engine::poll_departure`] after each call until the result is `None`. A late driver changes no fate, because every departure carries the
-/// instant at which the packet left its link. An instant before the latest instant counts as the latest instant.
+/// instant, and drains [`Engine::poll_departure`] after each call until the result is `None`. A late driver changes no fate, because every departure carries
+/// the instant at which the packet left its link. An instant before the latest instant counts as the latest instant.
 #[derive(Clone, Debug)]
 pub struct Engine {
     /// Latest instant given by the driver.
@@ -55,8 +55,8 @@ pub struct Engine {
     by_default: [Count; 2],
 }
 
-/// Time after which the cross packets that no packet has met are computed. The loop of the router comes by at least every 50 ms, also in a silence; so the first
-/// packet after any silence waits for the cross packets of 50 ms at most, 0.1 ms at 10,000 packets a second.
+/// Time after which cross packets are computed without a packet that meets them. The loop of the router turns at least every 50 ms, also in a silence, so the
+/// first packet after any silence waits for the cross packets of 50 ms at most, 0.1 ms at 10,000 packets a second.
 const CATCH_UP: Duration = Duration::from_millis(10);
 
 /// Packet leaving the router.
