@@ -11,8 +11,8 @@
 //! arm's spring and damper at the wanted motion; their other ends act in the plant of the device. A target that moves is a given function of time. It moves a
 //! solution of the equations, not the difference of two solutions, and so has no part in stability.
 //!
-//! The seen places of the latest m ticks are states. They stand beside the samples of earlier frames, as one more series of numbers: one number for each tick of
-//! the node. A frame uses only the numbers that reach the hand within the frame.
+//! The seen places of the latest m ticks are states. They stand beside the samples of earlier frames, as one more series of numbers: one number for each tick
+//! of the node. A frame uses only the numbers that reach the hand within the frame.
 
 use cohaptic_peer::Gains;
 
