@@ -6,7 +6,7 @@
 //!  flow      └─ …                ─┘   old: all other queues with packets, served in turn, `quantum` bytes each
 //! ```
 //!
-//! A queue begins as a new queue, and becomes an old queue after its first quantum. The packet of a flow that sends rarely therefore waits only for the packet on
+//! A queue begins as a new queue, and becomes an old queue after its first quantum. So the packet of a flow that sends rarely waits only for the packet on
 //! the line. Where RFC 8290 leaves a choice, the choice is the choice of Linux: a full queue drops half of the bytes of the longest queue, from its head and at
 //! most 64 packets (section 4.1), and CoDel's limit of one packet is compared with the bytes of all queues together.
 
