@@ -63,8 +63,8 @@ pub struct Scene {
 }
 
 impl fmt::Debug for Scene {
-    /// Writes rotation, topology, relay, task, measure and `scaled_for` only where the scene has such a part. Fingerprints of records are made of this text, so that
-    /// a scene without the part must print as before the part existed.
+    /// Writes rotation, topology, relay, task, measure and `scaled_for` only where the scene has such a part. Fingerprints of records are made of this text,
+    /// so a scene without the part must print as before the part existed.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         // Destructured without `..`: a new field does not compile until this function decides how to show the field.
         let Self {
