@@ -101,8 +101,8 @@ pub enum CongestionControl {
     /// The window grows with unmarked segments in the round of a reduction too, as with TCP Prague; `dctcp` of Linux lets it rest for this round.
     ///
     /// The receiver of the data must have DCTCP as well. It then reports the mark of each segment (RFC 8257, section 3.2): ECE is set while arriving segments
-    /// are marked, and each change is acknowledged at once. A receiver of RFC 3168 repeats ECE until the sender has answered, so the sender would see a whole round
-    /// as marked. Accurate ECN (RFC 9768) is not implemented.
+    /// are marked, and each change is acknowledged at once. A receiver of RFC 3168 repeats ECE until the sender has answered, so the sender would see a whole
+    /// round as marked. Accurate ECN (RFC 9768) is not implemented.
     Dctcp,
 }
 
