@@ -57,8 +57,8 @@ impl ToLink for KernelNetem {
 }
 
 impl ToLink for str {
-    /// Parses the words of `tc-netem`, which are emulated exactly: see [`Netem::to_link_config`]. An empty text is the ideal link. With the feature `files`, a text
-    /// can also be the name of a link that somebody measured, such as `starlink/up`: see `docs/how-to-named-link.md` in the repository.
+    /// Parses the words of `tc-netem` for an exact emulation: see [`Netem::to_link_config`]. An empty text is the ideal link. With the feature `files`, a text
+    /// can also be the name of a measured link, such as `starlink/up`: see `docs/how-to-named-link.md` in the repository.
     #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
     fn to_link(&self) -> LinkModel {
         parse(self).unwrap_or_else(|fault| panic!("{fault}"))
