@@ -13,7 +13,8 @@ use crate::failure::{EXPECTATION, Failure};
 use crate::file::write_file;
 use crate::{file, output};
 
-/// Estimates a link, or takes the link that a file records, and prints the link. With `--out`, also writes the link into a file, unless `--require-law` is given and no law fits the delays.
+/// Estimates a link, or takes the link recorded by a file, and prints the link. With `--out`, also writes the link into a file, unless `--require-law` is given
+/// and no law fits the delays.
 pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
     let source = read(arguments)?;
     let out = arguments.out.as_deref().unwrap_or_else(|| Path::new("link.toml"));
