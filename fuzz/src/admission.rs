@@ -75,7 +75,7 @@ impl World {
     fn new(setup: u8) -> Self {
         let key = (setup & 1 == 1).then(|| SessionKey::from_bytes([0xa5; 32]));
         let has_limits = setup & 2 == 2;
-        let (kind, axes) = (KINDS[usize::from(setup >> 2) % 5], 1 + usize::from(setup >> 5) % 3);
+        let (kind, axes) = (KINDS[usize::from(setup >> 2) % 6], 1 + usize::from(setup >> 5) % 3);
         let seat = |place, name: &str| Seat { place: Place(place), name: name.to_owned(), tick: Duration::from_millis(1) };
         let config = AdmissionConfig {
             kind,

@@ -62,7 +62,7 @@ proptest! {
     /// With a dead band of nothing every sample is sent, and with a heartbeat of the period too.
     #[test]
     fn a_dead_band_of_nothing_changes_nothing(mut draft in drafts::anything()) {
-        prop_assume!(!draft.strategy.kind().is_personal());
+        prop_assume!(!draft.strategy.kind(&draft.settings).is_personal());
         draft.send_when = None;
         let all = run(&draft.scene(), Model::Least);
         draft.send_when = Some(SendWhen { velocity: Some(0.0), position: None, heartbeat: None });

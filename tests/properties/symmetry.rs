@@ -34,7 +34,7 @@ proptest! {
     #[test]
     fn three_peers_in_another_order_move_as_before(mut draft in drafts::anything_among(Just(3)), order in Just(vec![0, 1, 2]).prop_shuffle()) {
         // Energies and waves are added in the order in which they arrive, and a server is one of the peers.
-        if draft.strategy.kind() != SampleKind::State {
+        if draft.strategy.kind(&draft.settings) != SampleKind::State {
             draft.strategy = drafts::PAPER[0];
         }
         for peer in &mut draft.peers {

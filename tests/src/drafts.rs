@@ -170,7 +170,7 @@ fn of_one_shape(
                 for (draft, link, links) in &mut drafts {
                     draft.timeline.clone_from(&timeline);
                     draft.send_when = None;
-                    if draft.strategy.kind() != SampleKind::State {
+                    if draft.strategy.kind(&draft.settings) != SampleKind::State {
                         draft.strategy = Coordination::AveragePosition;
                     }
                     draft.link.clone_from(link);

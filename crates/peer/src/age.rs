@@ -117,13 +117,13 @@ impl<const A: usize> Ages<A> {
         sample: &Sample<A>,
         extra: &Extra<A>,
     ) -> Result<Reception, ReceiveError> {
-        // The peer decides whether the sample is the newest; only then the age sees the sample.
+        // The peer decides whether the sample changes what is held; only then the age sees the sample.
         let received = peer.handle_extended(sample, extra)?;
-        let place = peer.place_of(sample.sender).filter(|_| received == Reception::Newest);
+        let place = peer.place_of(sample.sender).filter(|_| received != Reception::Stale);
         if let Some(aged) = self.aged.iter_mut().find(|aged| Some(aged.place) == place) {
             // The attitude first: `arrived` clears `awaited`, by which `turned` recognises a return.
             aged.turned(sample.sequence, &extra.attitude);
-            aged.arrived(sample.sequence, sample.state);
+            aged.arrived(sample.sequence, peer.newest_of(aged.place, &sample.state));
         }
         Ok(received)
     }

@@ -82,6 +82,7 @@ mod exact_means;
 mod exact_sum;
 mod gains;
 mod held;
+mod increments;
 mod lead;
 mod motion;
 mod number;

@@ -9,6 +9,7 @@ use core::time::Duration;
 use cohaptic_units::Instant;
 
 use crate::coordination::{LawValues, Prediction, Role};
+use crate::increments::Increments;
 use crate::operator::Seen;
 use crate::rotation::{Attitude, Rotation};
 use crate::tick::on_object;
@@ -57,6 +58,9 @@ pub struct Peer<const A: usize, D, S> {
     /// Answers of the strategy that were asked once, in [`Peer::new`].
     asked: Asked,
     held: Held<A>,
+    /// Sums of the displacements of each sender, whose positions `held` then contains; `None` unless this peer sums displacements. Boxed, because only a server
+    /// of clients that send displacements has sums.
+    increments: Option<Box<Increments<A>>>,
     /// Rotation of copy and device, for an object with an inertia. Boxed, because most scenes do not rotate.
     rotation: Option<Box<Rotation>>,
     /// `true` if a sample has changed since the last computation of the mean.
@@ -118,6 +122,8 @@ pub struct Forces<const A: usize> {
 pub enum Reception {
     /// The sample is the newest of its sender and is held from now on.
     Newest,
+    /// The sample is late, and its displacement was added to the position held for its sender.
+    Added,
     /// The sample is late or repeated. Nothing changed.
     Stale,
 }
@@ -160,10 +166,28 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         }
         // The answers of the strategy are asked once: calls through a boxed strategy at every tick would repeat them.
         let (asked, local_time) = (Asked::by(&strategy), Instant::ZERO);
+        let sums = asked.kind == SampleKind::Increment && asked.role == Role::Copy;
+        let states = (0..held.len()).filter_map(|place| held.state(place).copied());
+        let increments = sums.then(|| Box::new(Increments::new(states)));
         let (rotation, stale_mean, next_sequence) = (None, false, 0);
         let tick_nanos = u64::try_from(config.tick.as_nanos()).unwrap_or(u64::MAX);
         let (computed, applied) = (none, none);
-        Self { config, device, object, strategy, asked, held, rotation, stale_mean, next_sequence, local_time, tick_nanos, computed, applied }
+        Self {
+            config,
+            device,
+            object,
+            strategy,
+            asked,
+            held,
+            increments,
+            rotation,
+            stale_mean,
+            next_sequence,
+            local_time,
+            tick_nanos,
+            computed,
+            applied,
+        }
     }
 
     /// Adds a rotating copy. The samples of such a peer carry attitudes, so its strategy must be a law without extra numbers.
@@ -198,18 +222,23 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     pub fn next_sample(&mut self, local_time: Instant) -> Sample<A> {
         let sequence = self.next_sequence;
         self.next_sequence = sequence.wrapping_add(1);
-        let state = match self.asked.role {
+        Sample { session: self.config.session, sender: self.config.place, sequence, sent: local_time, state: self.sampled() }
+    }
+
+    /// Returns the state in the present sample: that of the copy or, of a client, that of the device.
+    #[inline]
+    fn sampled(&self) -> State<A> {
+        match self.asked.role {
             Role::Copy => *self.object.state(),
             Role::Client { .. } => self.device.state(),
-        };
-        Sample { session: self.config.session, sender: self.config.place, sequence, sent: local_time, state }
+        }
     }
 
     /// Returns the extra numbers of the present sample for `receiver`, an index into the other peers in their order without this peer; 0 for kinds that are
     /// equal for all receivers.
     #[inline]
     pub fn extra(&mut self, receiver: usize) -> [f64; A] {
-        self.strategy.extra(receiver, self.object.state(), &self.held)
+        self.strategy.extra(receiver, &self.sampled(), &self.held)
     }
 
     /// Returns the attitude of the copy, or [`Attitude::REST`] without rotation.
@@ -220,7 +249,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
 
     /// Tells the strategy that the samples of this tick are complete for all receivers.
     pub fn all_sent(&mut self) {
-        self.strategy.sent(self.object.state());
+        self.strategy.sent(&self.sampled());
     }
 
     /// Returns the kind of data in samples beyond position and velocity.
@@ -270,6 +299,9 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// [`ReceiveError`] for a sample that is not for this peer. Nothing changed.
     #[inline(always)]
     pub fn handle_extended(&mut self, sample: &Sample<A>, extra: &Extra<A>) -> Result<Reception, ReceiveError> {
+        if self.increments.is_some() {
+            return self.handle_increment(sample, &extra.numbers);
+        }
         let Some(place) = self.accept(sample)? else { return Ok(Reception::Stale) };
         if self.asked.kind != SampleKind::State {
             self.strategy.accept(place, &extra.numbers);
@@ -280,14 +312,43 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         Ok(Reception::Newest)
     }
 
-    /// Takes in position and velocity, and returns the index of the sender in [`Held`]; `None` for a late or repeated sample.
+    /// Takes in a sample with a displacement. The position held for the sender is the sum of all displacements, whatever the position in the sample is. Not
+    /// inlined, because few peers sum displacements.
+    #[inline(never)]
+    fn handle_increment(&mut self, sample: &Sample<A>, displacement: &[f64; A]) -> Result<Reception, ReceiveError> {
+        let place = self.sender_of(sample)?;
+        let Some(increments) = &mut self.increments else { return Ok(Reception::Stale) };
+        let is_added = increments.add(place, sample.sequence, displacement);
+        let state = State { velocity: sample.state.velocity, ..increments.state(place) };
+        let received = if self.held.accept(place, sample.sequence, sample.sent, state) {
+            increments.set_velocity(place, state.velocity);
+            Reception::Newest
+        } else if is_added {
+            // The velocity stays that of the newest sample.
+            let state = increments.state(place);
+            self.held.replace_state(place, state, state.velocity);
+            Reception::Added
+        } else {
+            Reception::Stale
+        };
+        self.stale_mean |= received != Reception::Stale;
+        Ok(received)
+    }
+
+    /// Returns the index of a sample's sender in [`Held`].
     #[inline(always)]
-    fn accept(&mut self, sample: &Sample<A>) -> Result<Option<usize>, ReceiveError> {
+    fn sender_of(&self, sample: &Sample<A>) -> Result<usize, ReceiveError> {
         // The session first: a sender's place has a meaning only inside its session.
         if sample.session != self.config.session {
             return Err(ReceiveError::Session { found: sample.session });
         }
-        let Some(place) = self.place_of(sample.sender) else { return Err(ReceiveError::Sender { sender: sample.sender }) };
+        self.place_of(sample.sender).ok_or(ReceiveError::Sender { sender: sample.sender })
+    }
+
+    /// Takes in position and velocity, and returns the index of the sender in [`Held`]; `None` for a late or repeated sample.
+    #[inline(always)]
+    fn accept(&mut self, sample: &Sample<A>) -> Result<Option<usize>, ReceiveError> {
+        let place = self.sender_of(sample)?;
         let is_newest = self.held.accept(place, sample.sequence, sample.sent, sample.state);
         // The mean waits until the tick: several samples may arrive before.
         self.stale_mean |= is_newest;
@@ -421,6 +482,9 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// If the index `other` is out of range.
     pub fn hold(&mut self, other: usize, sent: Instant, state: State<A>) {
         self.held.hold(other, sent, state);
+        if let Some(increments) = &mut self.increments {
+            increments.restart(other, state);
+        }
         self.stale_mean = true;
     }
 
@@ -498,6 +562,11 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     #[inline(always)]
     pub(crate) fn place_of(&self, sender: u32) -> Option<usize> {
         self.held.place_of(sender, self.config.place)
+    }
+
+    /// Returns the state of the sender with index `place` after the sample `newest` was taken in: `newest` itself, or the sum of displacements.
+    pub(crate) fn newest_of(&self, place: usize, newest: &State<A>) -> State<A> {
+        self.increments.as_ref().map_or(*newest, |increments| increments.state(place))
     }
 
     /// Returns the parts that [`crate::Ages`] change: own state, held samples, the flag of a stale mean, and the rotation.

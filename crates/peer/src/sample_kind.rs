@@ -18,6 +18,8 @@ pub enum SampleKind {
     Wave,
     /// A force per axis \[N\] for one receiver.
     Force,
+    /// For a server, the displacement per axis since the sample before \[m\], to be added once; for a client, a force per axis \[N\].
+    Increment,
 }
 
 impl SampleKind {
@@ -26,14 +28,14 @@ impl SampleKind {
     pub(crate) const fn version(self) -> u16 {
         match self {
             Self::State | Self::Attitude => 1,
-            Self::Energy | Self::Wave | Self::Force => 2,
+            Self::Energy | Self::Wave | Self::Force | Self::Increment => 2,
         }
     }
 
     /// Returns whether each receiver gets a sample of its own.
     #[must_use]
     pub const fn is_personal(self) -> bool {
-        matches!(self, Self::Wave | Self::Force)
+        matches!(self, Self::Wave | Self::Force | Self::Increment)
     }
 
     /// Returns the length of a datagram with `axes` axes \[byte\].
@@ -59,6 +61,7 @@ impl SampleKind {
             Self::Attitude | Self::Energy => 1,
             Self::Wave => 2,
             Self::Force => 3,
+            Self::Increment => 4,
         }
     }
 }

@@ -6,10 +6,10 @@
 //!      0     4  "CHPT"
 //!      4     2  version, 1 or 2
 //!      6     1  axes, 1 to 3
-//!      7     1  version 1: 1 with an attitude, 0 without; version 2: the kind of the extra number, 1 energy, 2 wave, 3 force
+//!      7     1  version 1: 1 with an attitude, 0 without; version 2: the kind of the extra number, 1 energy, 2 wave, 3 force, 4 increment
 //!      8     8  session: only peers of one session understand each other
 //!     16     4  sender: the place of the peer in the session
-//!     20     4  kinds 2 and 3: place of the receiver in the session; otherwise zero
+//!     20     4  kinds 2 to 4: place of the receiver in the session; otherwise zero
 //!     24     8  sequence number of the sample, from 0
 //!     32     8  send time \[ns\] on the sender's clock
 //!     40     8  zero

@@ -141,10 +141,35 @@ impl Scene {
         (*strategy == Coordination::ClientServer).then(|| settings.of(*strategy).place(0))
     }
 
+    /// Returns whether clients send displacements, of which the server of the scene adds each once.
+    #[must_use]
+    pub fn sends_increments(&self) -> bool {
+        self.sample_kind() == SampleKind::Increment
+    }
+
+    /// Returns whether clients of the scene's server feel no force.
+    #[must_use]
+    pub fn returns_nothing(&self) -> bool {
+        let CoordinationSpec { strategy, settings, .. } = &self.coordination;
+        // Parameter 1 of client-server is `returns`.
+        let returns = settings.of(*strategy).get(1);
+        self.server().is_some() && matches!(returns, LawValue::Word(word) if strategy.parameters()[1].form.word(word) == "none")
+    }
+
     /// Returns the kind of samples: the values in samples in addition to the state.
     #[must_use]
-    pub const fn sample_kind(&self) -> SampleKind {
-        if self.rotation.is_some() { SampleKind::Attitude } else { self.coordination.strategy.kind() }
+    pub fn sample_kind(&self) -> SampleKind {
+        if self.rotation.is_some() { SampleKind::Attitude } else { self.coordination.strategy.kind(&self.coordination.settings) }
+    }
+
+    /// Returns the scene with states in place of displacements in the samples of clients. Over links of constant delay, which lose, repeat and reorder nothing,
+    /// both move alike but for rounding.
+    #[must_use]
+    pub fn with_states(&self) -> Self {
+        let mut settings = self.coordination.settings;
+        // Parameter 2 of client-server is `sends`, and its first word is `states`.
+        settings.of_mut(Coordination::ClientServer).set(2, LawValue::Word(0));
+        self.with_parameters(&settings)
     }
 
     /// Returns the scene with these own parameters of strategies.

@@ -126,6 +126,18 @@ pub enum AnalysisError {
          `cohaptic check`; or expected a scene without it"
     )]
     DeadBands,
+    /// Clients send displacements over a line that does more than delay all samples alike.
+    #[error(
+        "with sends = \"increments\" the server adds displacements, and what {line} loses, repeats or reorders is missing in the sum from then on: its position then \
+         wanders off, and no disturbance of it dies out; expected lines of a constant delay from {peer} to the server, or sends = \"states\"; simulations show \
+         where it wanders, as in `cohaptic run`"
+    )]
+    LostIncrements {
+        /// The line, in words.
+        line: String,
+        /// Name of the client.
+        peer: String,
+    },
     /// The strategy uses the ages of samples, and the clocks drift apart.
     #[error("{strategy} coordination uses the ages of samples, which do not repeat where clocks drift apart: expected one drift for all peers")]
     AgesByClocks {

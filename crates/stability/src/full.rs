@@ -63,7 +63,8 @@ pub enum Trust {
     Nothing,
 }
 
-/// Pushes every unit vector of a scene's state through a frame, with the motion along `axes` axes (1 to 3).
+/// Pushes every unit vector of a scene's state through a frame, with the motion along `axes` axes (1 to 3). Displacements that clients send are followed as the
+/// positions that these displacements add up to: the nominal network of such a scene has lines of constant delay to the server.
 ///
 /// # Errors
 ///
@@ -77,6 +78,8 @@ pub fn full_along(
     watch: &dyn Watch,
     strategies: &impl Strategies,
 ) -> Result<FullMap, AnalysisError> {
+    let with_states = scene.sends_increments().then(|| scene.with_states());
+    let scene = with_states.as_ref().unwrap_or(scene);
     match axes {
         1 => full::<1, _>(scene, network, contacts, trust, watch, |peer| strategies.strategy(scene, peer)),
         2 => full::<2, _>(scene, network, contacts, trust, watch, |peer| strategies.strategy(scene, peer)),

@@ -79,6 +79,8 @@ fn a_certificate_of_a_server_that_says_more_than_it_shows_is_refused() {
         (with_table("{ returns = \"object\" }"), "those after them"),
         (with_table("{ server = \"peer3\" }"), "classes of peers|none of the scene|those of the scene"),
         (with_table("{ returns = \"velocity\" }"), "not covered"),
+        (with_table("{ returns = \"none\" }"), "not covered"),
+        (with_table("{ sends = \"increments\" }"), "not covered"),
         (scene("\"client-server\"", "\"average-position\""), "a state that is missing"),
         (scene("delay = \"8ms\"", "delay = \"40ms\""), "a sample that is missing"),
         (scene("update = \"8ms\"", "update = \"9ms\""), "not dominant|sample that is missing"),

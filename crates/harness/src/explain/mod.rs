@@ -287,6 +287,16 @@ impl Rows {
             format!("{len} bytes {receivers} every {}{}", Span(spec.update), dead_bands(spec.send_when.as_ref())),
             "with the size and the numbers of the datagrams of a live session",
         );
+        if scene.sends_increments() {
+            self.model(
+                "positions of clients at the server",
+                "sums of the displacements that have arrived, each counted once and in any order; the velocity is that of the newest sample",
+                "sends = \"increments\": a lost sample loses motion; the analysis of stability follows displacements over lines of constant delay alone",
+            );
+        }
+        if scene.returns_nothing() {
+            self.leave_out("forces on the devices of clients: returns = \"none\", so clients see the object and feel nothing");
+        }
     }
 
     /// Adds the analysis of stability of a rotating object.

@@ -188,3 +188,24 @@ fn operators_are_described_with_their_parameters() {
     let crossover = "crossover: the velocity of the hand is 3 rad/s times the error; sees the own copy, 150ms late";
     assert_eq!(found(&tracks), [row("operator of peer1, peer2", format!("{crossover}; {arm}"))]);
 }
+
+/// What a server makes of displacements, and what its clients feel, is said only where it is not as usual.
+#[test]
+fn displacements_and_missing_forces_are_said() {
+    let of = |sends: &str, returns: &str| {
+        let changes = [
+            "coordination.strategy=client-server".to_owned(),
+            format!("coordination.client-server={{ sends = \"{sends}\", returns = \"{returns}\" }}"),
+        ];
+        let text = "scene = { duration = \"1s\", count = 2 }\nobject.mass = 1\npeer = { device.mass = 1, coupling.stiffness = 9 }\n\
+                    coordination = { strategy = \"average-position\", stiffness = 1, update = \"8ms\" }";
+        let scene = Scene::parse(text, Path::new("x.toml"), &changes).unwrap_or_else(|error| panic!("{error}"));
+        let explanation = explain(&scene);
+        let sums = explanation
+            .models
+            .iter()
+            .any(|row| row.part == "positions of clients at the server" && row.reason.contains("a lost sample loses motion"));
+        (sums, explanation.left_out.iter().any(|what| what.contains("returns = \"none\"")))
+    };
+    assert_eq!((of("states", "force"), of("increments", "object"), of("states", "none")), ((false, false), (true, false), (false, true)));
+}

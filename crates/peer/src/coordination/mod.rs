@@ -22,7 +22,7 @@ pub(crate) mod strategy;
 mod wave;
 
 pub use average_position::AveragePosition;
-pub use client_server::ClientServer;
+pub use client_server::{ClientServer, Felt};
 pub use extrapolated::Extrapolated;
 pub use law::{Coefficients, Law, LawForm, LawParameter, LawParameters, LawValue, LawValues, LawVisitor, Observation, Pull, UsedGains};
 pub use law_strategy::LawStrategy;

@@ -4,7 +4,7 @@ use core::fmt;
 use core::time::Duration;
 
 use super::law::LawKind as _;
-use super::session::ControllerKind as _;
+use super::session::ControllerKind;
 use super::{
     AveragePosition, ClientServer, Coefficients as _, Command, Context, Extrapolated, Law, LawParameter, LawParameters, LawStrategy, LawValues,
     LawVisitor, LocalDamping, LocalLag, Observation, PassivityControl, ProportionalDerivative, Pull, Role, SessionParameters, SetPosition,
@@ -90,12 +90,12 @@ macro_rules! registry {
                 }
             }
 
-            /// Returns the kind of data in samples beyond position and velocity.
+            /// Returns the kind of data in samples beyond position and velocity, with these own parameters of strategies.
             #[must_use]
-            pub const fn kind(self) -> SampleKind {
+            pub fn kind(self, settings: &LawSettings) -> SampleKind {
                 match self {
                     $(Self::$law)|+ => SampleKind::State,
-                    $(Self::$controller => <$controller<1>>::KIND,)+
+                    $(Self::$controller => <$controller<1> as ControllerKind<1>>::kind(settings.of(self)),)+
                 }
             }
 
@@ -178,7 +178,7 @@ macro_rules! registry {
             fn kind(&self) -> SampleKind {
                 match self {
                     Self::Law(_) => SampleKind::State,
-                    $(Self::$controller(_) => <$controller<A>>::KIND,)+
+                    $(Self::$controller(controller) => Strategy::kind(controller),)+
                 }
             }
 

@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use super::{LawParameter, LawParameters, Pull, UsedGains};
+use super::{LawParameter, LawParameters, LawValues, Pull, UsedGains};
 use crate::sample_kind::SampleKind;
 use crate::{Contact, Gains, State};
 
@@ -35,10 +35,15 @@ pub(super) trait ControllerKind<const A: usize> {
     const PULL: Pull = Pull::Mean;
     /// Gains used by the strategy.
     const GAINS: UsedGains = UsedGains::Both;
-    /// Kind of data in samples beyond position and velocity.
+    /// Kind of data in samples beyond position and velocity, unless [`ControllerKind::kind`] says otherwise.
     const KIND: SampleKind;
     /// Parameters of this strategy alone.
     const PARAMETERS: &[LawParameter];
+
+    /// Returns the kind of data in samples beyond position and velocity, with these parameters.
+    fn kind(_own: &LawValues) -> SampleKind {
+        Self::KIND
+    }
 
     /// Returns β [N·s/m], the damping of the peer's own copy by the strategy. β is part of the body, and the command leaves it out.
     fn damping(_parameters: &LawParameters) -> f64 {

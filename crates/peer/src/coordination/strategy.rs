@@ -152,15 +152,16 @@ pub trait Strategy<const A: usize> {
     }
 
     /// Returns the extra numbers of the present sample, before the command of the tick. `receiver` is the index of the receiver in the order of peers without
-    /// this peer, or 0 for a kind that is equal for all receivers.
+    /// this peer, or 0 for a kind that is equal for all receivers. `own` is the state in the sample: that of the copy, or of the device of a client.
     fn extra(&mut self, _receiver: usize, _own: &State<A>, _held: &Held<A>) -> [f64; A] {
         [0.0; A]
     }
 
-    /// Tells the strategy that the samples of this tick are complete for all receivers.
+    /// Tells the strategy that the samples of this tick are complete for all receivers. `own` is the state in these samples.
     fn sent(&mut self, _own: &State<A>) {}
 
-    /// Takes in the extra numbers of a sample that is newer than all earlier samples of this sender. `_other` is the index of the sender in the order of
+    /// Takes in the extra numbers of a sample that is newer than all earlier samples of this sender. Not called for [`SampleKind::Increment`] at a peer with a
+    /// copy: the peer itself adds these numbers to the held position. `_other` is the index of the sender in the order of
     /// peers without this peer.
     fn accept(&mut self, _other: usize, _numbers: &[f64; A]) {}
 

@@ -5,6 +5,7 @@
 
 mod ageing;
 mod extrapolated;
+mod increments;
 mod late_samples;
 mod laws;
 mod local_lag;

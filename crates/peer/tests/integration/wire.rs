@@ -115,6 +115,7 @@ fn row_of(kind: SampleKind) -> (u16, u8, &'static [&'static str]) {
         SampleKind::Energy => (2, 1, EXTENDED),
         SampleKind::Wave => (2, 2, EXTENDED),
         SampleKind::Force => (2, 3, EXTENDED),
+        SampleKind::Increment => (2, 4, EXTENDED),
     }
 }
 
@@ -184,7 +185,7 @@ fn datagram_like() -> impl Strategy<Value = Vec<u8>> {
 }
 
 fn kind() -> impl Strategy<Value = SampleKind> {
-    select(&[SampleKind::State, SampleKind::Energy, SampleKind::Wave, SampleKind::Force][..])
+    select(&[SampleKind::State, SampleKind::Energy, SampleKind::Wave, SampleKind::Force, SampleKind::Increment][..])
 }
 
 fn extra() -> impl Strategy<Value = Extra<3>> {

@@ -63,6 +63,12 @@ pub enum ProofError {
         /// The name of the law.
         strategy: &'static str,
     },
+    /// Clients of a server send displacements, or feel nothing.
+    #[error(
+        "a server is followed whose clients send states and feel a force: expected sends = \"states\" and returns = \"force\" or \"object\"; \
+         `stability point`, `map` and `boundary` follow the others, without --prove"
+    )]
+    Clients,
     /// Waves run over links that differ, or between clocks that differ.
     #[error(
         "waves are followed over equal links between peers whose clocks and phases are equal: expected such a scene; `stability point`, `map` and `boundary` follow the others, without --every-number and --prove"

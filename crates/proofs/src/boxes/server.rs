@@ -46,6 +46,9 @@ impl Server {
         let server = scenes[0].server().unwrap_or(0);
         let structure = Structure::of_any_law(scenes, network, contacts, |one, other| one == server || other == server)?;
         let class = structure.classes.iter().position(|class| class[0] == server).unwrap_or(0);
+        if scenes[0].sends_increments() || scenes[0].returns_nothing() {
+            return Err(ProofError::Clients);
+        }
         let returns = coordination.settings.of(coordination.strategy).get(RETURNS);
         Ok(Some((structure, Self { class, returns_forces: matches!(returns, LawValue::Word(FORCE)) })))
     }

@@ -4,6 +4,7 @@
 //! delay, samples of the scene are sent through the emulator until the fates repeat. Links without shared access lines are probed once for each
 //! configuration and each way of sampling, so very many equal peers cost as much as two.
 
+mod increments;
 mod nominal;
 mod notes;
 mod probe;
@@ -21,6 +22,7 @@ use cohaptic_wan::{AccessLine, LinkConfig, Network, NetworkConfig, NodeId, Packe
 
 pub use timing::LinkTiming;
 
+use self::increments::refuse_lost_increments;
 use self::nominal::Nominal;
 use self::probe::{MOST_SAMPLES, NoPattern, Probe, RatedLine};
 use self::sampling::Sampling;
@@ -63,8 +65,8 @@ impl NominalNetwork {
     /// # Errors
     ///
     /// [`AnalysisError`] if the fates of samples never repeat, because a queue is offered more than its rate or because periods do not meet; if too many
-    /// peers share lines; if the scene has a topology; if peers send only on changes (dead bands); or if an operator with the law crossover holds a device of an
-    /// object that turns.
+    /// peers share lines; if the scene has a topology; if peers send only on changes (dead bands); if clients send displacements over a line that does more than
+    /// delay; or if an operator with the law crossover holds a device of an object that turns.
     pub fn of(scene: &Scene) -> Result<Self, AnalysisError> {
         refuse_topology(scene, "this analysis")?;
         if scene.rotation.is_some() {
@@ -73,6 +75,7 @@ impl NominalNetwork {
         if scene.coordination.send_when.is_some() {
             return Err(AnalysisError::DeadBands);
         }
+        refuse_lost_increments(scene)?;
         let size = Bytes::new(scene.sample_kind().datagram_len(scene.axes.count()) as u64);
         let access = |model: Option<&cohaptic_wan::LinkModel>| model.map(|model| Nominal::of(model, size));
         let lines = Lines {

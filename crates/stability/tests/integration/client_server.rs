@@ -27,6 +27,56 @@ fn a_server_and_its_clients_have_the_radii_computed_elsewhere() {
     }
 }
 
+/// Arms hold the devices of both clients, so that without a returned force nothing is left that moves freely.
+const ARMS: [&str; 2] = [
+    "peers.left.hand={ arm = { mass = 0.5, damping = 20.0, stiffness = 300.0 } }",
+    "peers.right.hand={ arm = { mass = 0.5, damping = 20.0, stiffness = 300.0 } }",
+];
+
+/// Over a constant delay displacements add up to positions, and the analysis is that of states.
+#[test]
+fn displacements_are_followed_where_they_add_up_to_positions() {
+    for changes in [&[][..], &["coordination.client-server.returns=object"], &[ARMS[0], ARMS[1], "coordination.client-server.returns=none"]] {
+        let of = |sends: &str| analyse(&read("coordination/client-server.toml", &[changes, &[sends]].concat()), Method::Reduced).unwrap();
+        let (states, increments) = (of("coordination.client-server.sends=states"), of("coordination.client-server.sends=increments"));
+        assert_eq!((increments.radius.value, increments.dimension), (states.radius.value, states.dimension), "{changes:?}");
+    }
+}
+
+/// Nothing comes back, so the object swings alone on the couplings to two devices. The couplings are sampled at each tick h: with K = 200 N/m, B = 10 N·s/m and
+/// m = 0.45 kg the product of both eigenvalues of a tick is 1 − B·h/m + K·h²/(2·m) = 0.978. The devices on their arms come to rest sooner.
+#[test]
+fn without_a_returned_force_the_object_swings_alone() {
+    let scene = read("coordination/client-server.toml", &[ARMS[0], ARMS[1], "coordination.client-server.returns=none"]);
+    let analysis = analyse(&scene, Method::Full).unwrap();
+    // Eight ticks a frame, and the square root of the product for each eigenvalue.
+    assert!((analysis.radius.value - 0.978_f64.powi(4)).abs() < 1e-9, "{:?}", analysis.radius);
+    // Without arms nothing brings the devices together again.
+    let free = analyse(&read("coordination/client-server.toml", &["coordination.client-server.returns=none"]), Method::Full).unwrap();
+    assert_eq!(free.verdict(), Verdict::Marginal, "{:?}", free.radius);
+}
+
+#[test]
+fn displacements_over_a_line_that_does_more_than_delay_are_refused_by_name() {
+    let increments = "coordination.client-server.sends=increments";
+    for (change, line, peer) in [
+        ("link.loss=5%", "the link from left to server", "left"),
+        ("links=[{ from = \"right\", to = \"server\", duplicate = { probability = 0.1 } }]", "the link from right to server", "right"),
+        ("links=[{ from = \"right\", to = \"server\", loss = { packets = [3], every = 10 } }]", "the link from right to server", "right"),
+        ("peers.right.uplink.jitter=1ms", "the uplink of right", "right"),
+        ("peers.server.downlink.rate=1Mbit", "the downlink of server", "left"),
+    ] {
+        let scene = read("coordination/client-server.toml", &[increments, change]);
+        let expected = AnalysisError::LostIncrements { line: line.to_owned(), peer: peer.to_owned() };
+        assert_eq!(analyse(&scene, Method::Reduced), Err(expected), "{change}");
+        let states = read("coordination/client-server.toml", &[change]);
+        assert!(analyse(&states, Method::Reduced).is_ok(), "{change}");
+    }
+    // What the server sends may get lost: the clients of this scene hold a force less, and no sum.
+    let back = "links=[{ from = \"server\", to = \"left\", loss = { packets = [3], every = 10 } }]";
+    analyse(&read("coordination/client-server.toml", &[increments, back]), Method::Reduced).unwrap();
+}
+
 /// Nothing depends on the device of a client that lets go. The rest of the scene has the eigenvalues of a scene without this client.
 #[test]
 fn a_client_that_lets_go_changes_nothing() {

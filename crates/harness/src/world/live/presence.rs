@@ -120,7 +120,7 @@ impl<const A: usize> RemotePeers<A> {
     ) -> Result<Reception, ReceiveError> {
         let (from, to) = ends;
         let received = self.ages[to].handle_extended(peer, sample, extra)?;
-        // A stale sample neither moves what the receiver holds nor ends a silence.
+        // A stale sample neither moves what the receiver holds nor ends a silence, and a late displacement ends none.
         if received == Reception::Newest {
             self.arrived(now, from, to);
         }
