@@ -7,6 +7,7 @@
 //! | [`eigenvectors`] | no tests: what some of the others share |
 //! | [`hard`] | hard cases of the numerics, of time and of size |
 //! | [`house`] | rules that the project keeps to |
+//! | [`prediction`] | the times of people over bad networks that the book predicts |
 //! | [`properties`] | properties of runs, tried on scenes drawn at random |
 //! | [`scenarios`] | the expectations of the shipped scenes |
 //! | [`testkit`] | the test kit with its feature `scenes` |
@@ -16,6 +17,7 @@ mod determinism;
 mod eigenvectors;
 mod hard;
 mod house;
+mod prediction;
 mod properties;
 mod scenarios;
 mod testkit;

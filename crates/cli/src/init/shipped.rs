@@ -118,6 +118,7 @@ shipped![
     "tasks/operator-track",
     "tasks/reach",
     "tasks/stop",
+    "tasks/telesurgery",
     "tasks/track",
     "counterexamples/ap-unaffected",
     "counterexamples/below-the-bound",

@@ -113,6 +113,7 @@ pages! {
     netem: "docs/netem.md",
     falcon_crate: "crates/falcon/README.md",
     peer_crate: "crates/peer/README.md",
+    prediction: "docs/prediction.md",
     python: "python/README.md",
     reference_commands: "docs/reference-commands.md",
     reference_documents: "docs/reference-documents.md",
