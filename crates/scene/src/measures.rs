@@ -157,7 +157,7 @@ impl MeasureName {
 impl Measure {
     /// Returns whether the measure belongs to a task, and has no meaning in a scene without a task.
     #[must_use]
-    pub(crate) const fn is_of_task(self) -> bool {
+    pub const fn is_of_task(self) -> bool {
         match self {
             Self::TaskTime
             | Self::Throughput

@@ -41,7 +41,7 @@ pub fn document(finished: &Finished, written: Option<&Written>) -> impl Serializ
         written: written.map(|written| document! {
             wall_s: written.wall_s,
             out: written.out.as_str(),
-            // The table of runs, the verdicts, the table of figures and the page.
+            // The table of runs, the verdicts, the table of figures, the page, and the pictures of a task.
             files: written.files.as_slice(),
         }),
         strategies: strategies.collect::<Vec<_>>(),

@@ -11,7 +11,7 @@ use cohaptic_campaign::{CampaignPlan, Comparison, Judgement, Report, Variation};
 
 pub use document::document;
 pub use judge::ByAnalysisOrRuns;
-pub use page::{PageSource, html};
+pub use page::{PageSource, html, pictures};
 pub use rows_file::csv;
 pub use words::words;
 

@@ -27,7 +27,7 @@ pub(crate) struct CompareArguments {
     /// Number of runs of each combination, with the same seeds for all strategies [default: 10]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 10, hide_default_value = true)]
     pub(crate) runs: u64,
-    /// Folder of the comparison: the table of runs, verdicts, compare.csv and compare.html. Repeat the command to go on from there
+    /// Folder of the comparison: the table of runs, verdicts, compare.csv, compare.html, and pictures of a task. Repeat the command to go on from there
     #[arg(long, value_name = "DIR", required_unless_present_any = ["merge", "status"])]
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]

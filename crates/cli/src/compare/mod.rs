@@ -55,6 +55,9 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitCode, Failure>
     for (name, content) in [("compare.csv", cohaptic_answers::compare::csv(&finished)), ("compare.html", html)] {
         files.push(write_into(out, name, content)?);
     }
+    for (name, picture) in cohaptic_answers::compare::pictures(&finished) {
+        files.push(write_into(out, &name, picture.svg())?);
+    }
     let written = Written { wall_s, out: output::path(out), files };
     let document = cohaptic_answers::compare::document(&finished, Some(&written));
     let words = || cohaptic_answers::compare::words(&finished, wall_s);

@@ -171,6 +171,42 @@ fn the_page_is_well_formed_and_stands_alone() {
     assert!(desk.read("diverged/compare.html").contains("diverged"));
 }
 
+/// The figures of a task against the rows of the table of runs. With a timeout of 6 s some runs are too slow.
+#[test]
+fn a_task_is_compared_by_the_runs_in_which_it_was_done() {
+    let desk = Desk::with("together.toml", include_str!("../../../../scenarios/tasks/together.toml"));
+    let line = "compare together.toml --strategies AP,PD --vary link.delay=0ms,50ms --vary scene.count=2,4 --set task.timeout=6s --runs 3 --format csv --out out";
+    let document = desk.json(&format!("{line} --json"));
+    let rows = rows(&desk, "out/runs.csv");
+    let combinations = document["combinations"].as_array().unwrap();
+    let mut counts = Vec::new();
+    for (place, combination) in combinations.iter().enumerate() {
+        let runs = &rows[3 * place..3 * (place + 1)];
+        let times: Vec<f64> = runs.iter().filter(|row| row["task.outcome"] == "done").map(|row| row["task.time_s"].parse().unwrap()).collect();
+        let time = combination["measures"].as_array().unwrap().iter().find(|measure| measure["name"] == "task_time_s").unwrap();
+        assert_eq!((combination["done"]["count"].as_u64(), time["count"].as_u64()), (Some(times.len() as u64), Some(times.len() as u64)));
+        assert!(times.is_empty() || (number(&time["mean"]["value"]) - times.iter().sum::<f64>() / count(&times)).abs() < 1e-12);
+        counts.push(times.len());
+    }
+    // The two laws are one for two people. For four people over 50 ms, proportional-derivative coordination is the slower one.
+    assert_eq!((counts[0], counts[2]), (counts[4], counts[6]), "{counts:?}");
+    assert!(counts[7] < counts[3] && counts[0] == 3, "{counts:?}");
+    let pictures = ["done.svg", "internal_force_n.svg", "motion_force_n.svg", "task_time_s.svg", "throughput_bit_s.svg"];
+    let svg = |name: &String| name.ends_with(".svg");
+    assert_eq!(desk.files("out").into_iter().filter(svg).collect::<Vec<String>>(), pictures);
+    let page = desk.read("out/compare.html");
+    assert_eq!(page_faults(&page), [""; 0]);
+    for part in ["<h2>Task</h2>", "<figure id=\"done\">", "Share of the runs whose task was done", &format!("{} of 3 (", counts[7])] {
+        assert!(page.contains(part), "no {part}");
+    }
+    // The picture of the page is that of the file.
+    let done = desk.read("out/done.svg");
+    assert!(page.contains(&done[done.find("<path").unwrap()..done.rfind("</svg>").unwrap()]), "done.svg is another picture");
+    let before = folder(&desk, "out");
+    desk.text(line);
+    assert!(folder(&desk, "out") == before, "the second time other bytes are written");
+}
+
 #[test]
 fn people_are_told_what_came_out() {
     let desk = desk();

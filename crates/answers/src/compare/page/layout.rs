@@ -6,6 +6,17 @@ use crate::campaign::Along;
 
 /// Greatest number of panels of a picture.
 const MOST_PANELS: usize = 16;
+/// Greatest number of panels side by side.
+const MOST_COLUMNS: usize = 4;
+
+/// Returns the number of panels side by side.
+pub(super) const fn columns_of(panels: usize) -> usize {
+    match panels {
+        1 => 1,
+        2 | 4 => 2,
+        _ => 3,
+    }
+}
 
 /// The varied keys other than the strategy, arranged in pictures.
 pub(super) struct Layout {
@@ -30,6 +41,15 @@ impl Layout {
     /// Returns the number of panels of a picture.
     pub(super) fn panels(&self) -> usize {
         self.facets.iter().map(|(_, count)| count).product()
+    }
+
+    /// Returns the number of panels side by side. If several keys have panels, a row has the values of the last one, so that panels which differ in nothing else
+    /// stand beside each other.
+    pub(super) fn columns(&self) -> usize {
+        match self.facets.as_slice() {
+            [_, .., (_, last)] if *last <= MOST_COLUMNS => *last,
+            _ => columns_of(self.panels()),
+        }
     }
 
     /// Returns the reason, in words, why pictures are not drawn; `None` for drawn pictures.
@@ -96,6 +116,19 @@ mod tests {
         // Values rise along x: 8 ms is the second value in the command. With grasp and 0.5 the combination is 6 + 2 + 1.
         assert_eq!(layout.other(3, Some(0)), 9);
         assert!(layout.y(&keys).is_none());
+    }
+
+    #[test]
+    fn a_row_of_panels_has_the_values_of_the_last_key() {
+        for (texts, columns) in [
+            (&["a=1,2", "b=x,y", "c=1,2,3,4"][..], 4),
+            (&["a=1,2", "b=x,y", "c=1,2,3,4,5"], 3),
+            (&["a=1,2", "c=1,2,3,4,5"], 3),
+            (&["a=1,2", "b=x,y"], 2),
+            (&["a=1,2"], 1),
+        ] {
+            assert_eq!(Layout::of(&keys(texts)).columns(), columns, "{texts:?}");
+        }
     }
 
     #[test]

@@ -7,13 +7,14 @@ mod tables;
 
 use cohaptic_picture::Picture;
 use cohaptic_picture::page::{Html, Page};
+use cohaptic_scene::{Measure, Scope};
 use cohaptic_units::print::Counted;
 
 use super::figures::Shown;
 use super::{Finished, words};
 use crate::page::{made_by, scene_text};
 use layout::Layout;
-use panels::Sheet;
+use panels::{Outcome, Sheet};
 use scale::Scale;
 
 /// Origin of the numbers, shown on the page.
@@ -44,6 +45,9 @@ pub fn html(finished: &Finished, source: &PageSource<'_>) -> String {
     }
     page = page.with(Html::heading(2, "Differences to the first strategy")).with(Html::paragraph(DIFFERENCES)).with(tables::overview(finished));
     page = page.with(Html::heading(2, "Stability")).with(stability(&sheet));
+    if comparison.has_task() {
+        page = page.with(Html::heading(2, "Task")).with(task(&sheet));
+    }
     page = page.with(measures(&sheet));
     page = page.with(Html::heading(2, "How the numbers are made")).with(Html::list(NOTES.map(Html::text)));
     page = page.with(made_by(&source.command));
@@ -79,18 +83,52 @@ fn sum(finished: &Finished) -> String {
 
 /// Returns the section of stability: verdicts as a picture, and diverged runs.
 fn stability(sheet: &Sheet<'_>) -> Html {
-    let drawn = sheet.layout.undrawn(sheet.finished.keys()).is_none();
+    let drawn = is_drawn(sheet);
     // Without drawn panels the tables stand alone: too many keys vary for a picture.
     let picture = sheet.stability().filter(|_| drawn).map_or_else(Html::default, |picture| figure("stability", &picture, ""));
     // A single panel would show no more than the table.
     let diverged = if !sheet.any_diverged() {
         Html::paragraph("No run diverged.")
     } else if drawn && sheet.layout.panels() > 1 {
-        figure("diverged", &sheet.diverged(), "Share of the runs that diverged, with Wilson's interval of 95 %.")
+        let caption = "Share of the runs that diverged, with Wilson's interval of 95 %.";
+        figure(Outcome::Diverged.name(), &sheet.shares(Outcome::Diverged), caption)
     } else {
         Html::default()
     };
     picture.and(Html::details("Verdicts and diverged runs", tables::stability(sheet.finished))).and(diverged)
+}
+
+/// Returns the section of the task: the shares of runs in which it was done.
+fn task(sheet: &Sheet<'_>) -> Html {
+    let about = "How many runs ended with the task done, with Wilson's interval of 95 %. The mean task time is that of these runs alone.";
+    // A single panel stands among the measures.
+    let picture = if is_drawn(sheet) && sheet.layout.panels() > 1 {
+        figure(Outcome::Done.name(), &sheet.shares(Outcome::Done), "Share of the runs whose task was done, with Wilson's interval of 95 %.")
+    } else {
+        Html::default()
+    };
+    Html::paragraph(about).and(picture).and(Html::details("Runs whose task was done", tables::done(sheet.finished)))
+}
+
+/// Returns whether the comparison is drawn at all.
+fn is_drawn(sheet: &Sheet<'_>) -> bool {
+    sheet.layout.undrawn(sheet.finished.keys()).is_none()
+}
+
+/// Draws the pictures of a comparison with a task, each with the name of its file: the shares of runs whose task was done, and the measures of the task that
+/// belong to the run as a whole. Draws nothing without a task, and nothing if too many keys vary for a picture.
+#[must_use]
+pub fn pictures(finished: &Finished) -> Vec<(String, Picture)> {
+    let sheet = Sheet { finished, layout: Layout::of(finished.keys()) };
+    let comparison = &finished.comparison;
+    if !comparison.has_task() || !is_drawn(&sheet) {
+        return Vec::new();
+    }
+    let is_shown = |name: &str| Measure::ALL.iter().any(|measure| measure.is_of_task() && measure.scope() == Scope::Run && measure.name() == name);
+    let measures = comparison.measures.iter().enumerate().filter(|(_, measure)| is_shown(&measure.name));
+    let measures = measures.map(|(place, measure)| (measure.name.as_str(), sheet.measure(place, &Scale::of(comparison, place))));
+    let done = (Outcome::Done.name(), sheet.shares(Outcome::Done));
+    std::iter::once(done).chain(measures).map(|(name, picture)| (format!("{name}.svg"), picture)).collect()
 }
 
 /// Returns the section of measures: a section per measure, or common pictures of all measures if each measure needs a single panel.

@@ -1,11 +1,11 @@
-//! The panels of a comparison: a line and a band per strategy over a key of numbers, or a row per strategy without such a key; shares of diverged runs; stable
-//! regions.
+//! The panels of a comparison: a line and a band per strategy over a key of numbers, or a row per strategy without such a key; shares of runs that diverged
+//! and of runs whose task was done; stable regions.
 
-use cohaptic_campaign::Judgement;
+use cohaptic_campaign::{Cell, Judgement, Share};
 use cohaptic_picture::{Axis, Band, Fill, Line, Look, Marker, Panel, Picture, Region};
 use cohaptic_stability::Verdict;
 
-use super::layout::Layout;
+use super::layout::{Layout, columns_of};
 use super::scale::Scale;
 use crate::campaign::Along;
 use crate::compare::{Finished, judge};
@@ -18,20 +18,36 @@ const HALF_BAR: f64 = 0.16;
 /// Greatest number of panels in a picture of all measures. More panels would stand too far from the legend.
 const PANELS: usize = 6;
 
-/// Returns the number of panels side by side.
-const fn columns_of(panels: usize) -> usize {
-    match panels {
-        1 => 1,
-        2 | 4 => 2,
-        _ => 3,
-    }
-}
-
 /// Returns a picture without a title, because the page has the title.
-fn picture(panels: Vec<Panel>) -> Picture {
-    let columns = columns_of(panels.len());
+fn picture(panels: Vec<Panel>, columns: usize) -> Picture {
     let aspect = if columns == 1 { 0.45 } else { 0.75 };
     Picture::new("").columns(columns).aspect(aspect).panels(panels)
+}
+
+/// Outcome of a run whose share of all runs is drawn.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Outcome {
+    /// The run diverged.
+    Diverged,
+    /// The task was done.
+    Done,
+}
+
+impl Outcome {
+    /// Returns the name of the picture, and of the axis.
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Diverged => "diverged",
+            Self::Done => "done",
+        }
+    }
+
+    const fn share(self, cell: &Cell) -> Option<Share> {
+        match self {
+            Self::Diverged => cell.diverged,
+            Self::Done => cell.done,
+        }
+    }
 }
 
 /// Content shared by all pictures of a page.
@@ -45,29 +61,38 @@ impl Sheet<'_> {
         self.finished.comparison.strategies.iter().map(String::as_str).enumerate()
     }
 
-    /// Draws all measures, a panel each, for a comparison without further panels.
+    /// Draws all measures, a panel each, for a comparison without further panels. Shares of runs come first.
     pub(super) fn all(&self, scales: &[Scale]) -> Vec<Picture> {
-        let shares = self.any_diverged().then(|| self.diverged_panel(0));
-        let panels: Vec<Panel> =
-            shares.into_iter().chain(scales.iter().enumerate().map(|(measure, scale)| self.measure_panel(measure, scale, 0))).collect();
-        panels.chunks(PANELS).map(|panels| self.arranged(picture(panels.to_vec()), panels.len())).collect()
+        let has_task = self.finished.comparison.has_task();
+        let shares = [(Outcome::Done, has_task), (Outcome::Diverged, self.any_diverged())].into_iter().filter(|(_, drawn)| *drawn);
+        let measures = scales.iter().enumerate().map(|(measure, scale)| self.measure_panel(measure, scale, 0));
+        let panels: Vec<Panel> = shares.map(|(outcome, _)| self.share_panel(outcome, 0)).chain(measures).collect();
+        let arranged = |panels: &[Panel]| {
+            let columns = columns_of(panels.len());
+            self.arranged(picture(panels.to_vec(), columns), columns)
+        };
+        panels.chunks(PANELS).map(arranged).collect()
     }
 
     /// Shares the axis of x between the panels, or gives each strategy a row.
-    fn arranged(&self, picture: Picture, panels: usize) -> Picture {
-        if self.layout.x.is_some() { picture.shared_x() } else { self.with_rows(picture.shared_y(), panels) }
+    fn arranged(&self, picture: Picture, columns: usize) -> Picture {
+        if self.layout.x.is_some() { picture.shared_x() } else { self.with_rows(picture.shared_y(), columns) }
     }
 
     /// Draws a measure, with a panel per value of the keys with panels.
     pub(super) fn measure(&self, measure: usize, scale: &Scale) -> Picture {
-        let panels = (0..self.layout.panels()).map(|panel| self.titled(self.measure_panel(measure, scale, panel), panel));
-        self.arranged(picture(panels.collect()).shared_y(), self.layout.panels())
+        self.of_panels(|panel| self.measure_panel(measure, scale, panel))
     }
 
-    /// Draws the shares of diverged runs, with a panel per value of the keys with panels.
-    pub(super) fn diverged(&self) -> Picture {
-        let panels = (0..self.layout.panels()).map(|panel| self.titled(self.diverged_panel(panel), panel));
-        self.arranged(picture(panels.collect()).shared_y(), self.layout.panels())
+    /// Draws the shares of runs, with a panel per value of the keys with panels.
+    pub(super) fn shares(&self, outcome: Outcome) -> Picture {
+        self.of_panels(|panel| self.share_panel(outcome, panel))
+    }
+
+    /// Draws a panel per value of the keys with panels. All panels have the same axis of y.
+    fn of_panels(&self, panel: impl Fn(usize) -> Panel) -> Picture {
+        let panels = (0..self.layout.panels()).map(|place| self.titled(panel(place), place));
+        self.arranged(picture(panels.collect(), self.layout.columns()).shared_y(), self.layout.columns())
     }
 
     /// Returns `true` if any run diverged.
@@ -76,8 +101,8 @@ impl Sheet<'_> {
     }
 
     /// Sets the height of a picture to the height of its rows.
-    fn with_rows(&self, picture: Picture, panels: usize) -> Picture {
-        let rows = (1 + self.finished.comparison.strategies.len()) * columns_of(panels);
+    fn with_rows(&self, picture: Picture, columns: usize) -> Picture {
+        let rows = (1 + self.finished.comparison.strategies.len()) * columns;
         picture.aspect(0.05 * from_place(rows))
     }
 
@@ -94,12 +119,12 @@ impl Sheet<'_> {
         self.panel(scale.axis(), value)
     }
 
-    fn diverged_panel(&self, panel: usize) -> Panel {
+    fn share_panel(&self, outcome: Outcome, panel: usize) -> Panel {
         let value = |strategy: usize, at: Option<usize>| {
-            let share = self.finished.comparison.cell(strategy, self.layout.other(panel, at)).diverged?;
+            let share = outcome.share(self.finished.comparison.cell(strategy, self.layout.other(panel, at)))?;
             Some((share.value(), share.low, share.high))
         };
-        self.panel(Axis::new("diverged").range(0.0, 1.0), value)
+        self.panel(Axis::new(outcome.name()).range(0.0, 1.0), value)
     }
 
     /// Draws values with intervals: over x, or as a row per strategy.
@@ -152,7 +177,8 @@ impl Sheet<'_> {
                 let at = |column: usize, row: usize| (strategy, self.layout.other(y.places[row], Some(column)));
                 self.areas(Panel::new(x.axis(), y.axis()), (&x.edges(), &y.edges()), at).titled(name)
             };
-            return Some(picture(self.names().map(panel).collect()).shared_x().shared_y());
+            let columns = columns_of(self.names().count());
+            return Some(picture(self.names().map(panel).collect(), columns).shared_x().shared_y());
         }
         let count = self.finished.comparison.strategies.len();
         let names: Vec<&str> = self.finished.comparison.strategies.iter().rev().map(String::as_str).collect();
@@ -163,8 +189,8 @@ impl Sheet<'_> {
             let axes = Panel::new(x.axis(), Axis::new("").categories(names.iter().copied()));
             self.titled(self.areas(axes, (&x.edges(), &rows), at), panel)
         };
-        let panels = self.layout.panels();
-        Some(self.with_rows(picture((0..panels).map(panel).collect()).shared_y(), panels).shared_x())
+        let columns = self.layout.columns();
+        Some(self.with_rows(picture((0..self.layout.panels()).map(panel).collect(), columns).shared_y(), columns).shared_x())
     }
 
     /// Draws the verdicts of cells as areas.

@@ -75,6 +75,14 @@ fn by_strategy(finished: &Finished, cell: impl Fn(usize, usize) -> Html) -> Html
     Html::table(&table)
 }
 
+/// Returns the table of runs whose task was done.
+pub(super) fn done(finished: &Finished) -> Html {
+    by_strategy(finished, |strategy, other| match finished.comparison.cell(strategy, other).done {
+        Some(share) => Html::text(&figures::share(&share)),
+        None => "refused".into(),
+    })
+}
+
 /// Returns the table of verdicts and diverged runs.
 pub(super) fn stability(finished: &Finished) -> Html {
     by_strategy(finished, |strategy, other| {
@@ -85,8 +93,7 @@ pub(super) fn stability(finished: &Finished) -> Html {
         let verdict = finished.judgement(strategy, other).map_or_else(String::new, words::verdict);
         // Most cells have no diverged run, and the verdict then stands alone.
         let diverged = cell.diverged.filter(|share| share.count > 0).map(|share| Html::text(&format!("diverged {}", figures::share(&share))));
-        let done = cell.done.map(|share| Html::text(&format!("task done {}", figures::share(&share))));
-        Html::lines(std::iter::once(verdict.into()).chain(diverged).chain(done))
+        Html::lines(std::iter::once(verdict.into()).chain(diverged))
     })
 }
 
