@@ -6,8 +6,8 @@ use std::time::Duration;
 use cohaptic_peer::operator::Seen;
 use cohaptic_peer::wire::{Extra, MAX_LEN, Sample, SampleKind};
 use cohaptic_peer::{
-    Clock, Command, Contact, Context, CopyConfig, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, ReceiveError, Reception, RestingDevice,
-    State, Strategy,
+    Clock, Command, Contact, Context, CopyConfig, Exchange, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, ReceiveError, Reception,
+    RestingDevice, State, Strategy,
 };
 
 use crate::Input;
@@ -67,6 +67,7 @@ fn peer(axes: usize, kind: SampleKind) -> Peer<3, RestingDevice<3>, Nothing> {
         coupling: gains,
         tick,
         compute_delay: false,
+        exchange: Exchange::EACH_TICK,
         own_damping: 0.0,
         enclosure: None,
     };

@@ -99,6 +99,7 @@ const ADDITIONS: [&[&str]; 26] = [
     &["peer.uplink={ rate = \"90kbit\", jitter = \"1ms\" }", "topology={ kind = \"star\", role = \"relay\" }"],
     &["peer.contact={ push = \"+x\" }"],
     &["peer.compute-delay=1"],
+    &["peer.device.exchange-every=3", "peer.device.exchange-age=1"],
     &["peer.clock={ drift = \"20ppm\" }"],
     &["object.enclosure={ min = -0.5, max = 0.5, stiffness = 2000.0, damping = 5.0 }"],
     &["peer.tick=500us"],

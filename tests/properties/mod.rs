@@ -18,6 +18,7 @@ mod parameter_changes;
 mod replay;
 mod rotation;
 mod rotation_laws;
+mod slow_devices;
 mod switching;
 mod symmetry;
 mod topologies;

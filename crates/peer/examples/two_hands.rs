@@ -16,8 +16,8 @@ use std::time::Duration;
 use cohaptic_peer::coordination::LawStrategy;
 use cohaptic_peer::wire::MAX_LEN;
 use cohaptic_peer::{
-    Clock, Contact, Coordination, CopyConfig, DeviceConfig, Gains, Hand, Held, Integrator, ObjectCopy, Peer, PeerConfig, Signal, SimulatedDevice,
-    State,
+    Clock, Contact, Coordination, CopyConfig, DeviceConfig, Exchange, Gains, Hand, Held, Integrator, ObjectCopy, Peer, PeerConfig, Signal,
+    SimulatedDevice, State,
 };
 
 const TICK: Duration = Duration::from_millis(1);
@@ -39,6 +39,7 @@ fn peer(place: u32, clock: &Clock) -> OnePeer {
         coupling: Gains { stiffness: 3500.0, damping: 5.0 },
         tick: TICK,
         compute_delay: false,
+        exchange: Exchange::EACH_TICK,
         own_damping: 0.0,
         enclosure: None,
     };

@@ -26,7 +26,7 @@
 //! use std::time::Duration;
 //!
 //! use cohaptic_peer::{
-//!     Clock, Command, Contact, Context, CopyConfig, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, RestingDevice, State, Strategy,
+//!     Clock, Command, Contact, Context, CopyConfig, Exchange, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, RestingDevice, State, Strategy,
 //! };
 //! use cohaptic_units::Instant;
 //!
@@ -55,6 +55,7 @@
 //!     coupling: Gains { stiffness: 3500.0, damping: 5.0 },
 //!     tick,
 //!     compute_delay: false,
+//!     exchange: Exchange::EACH_TICK,
 //!     own_damping: 0.0,
 //!     enclosure: None,
 //! };
@@ -80,6 +81,7 @@ mod device;
 mod enclosure;
 mod exact_means;
 mod exact_sum;
+mod exchange;
 mod gains;
 mod held;
 mod increments;
@@ -107,6 +109,7 @@ pub use coordination::strategy::{Command, Context, Strategy};
 pub use device::{Device, HandForce, RestingDevice, SimulatedDevice};
 pub use enclosure::Enclosure;
 pub use exact_means::ExactMeans;
+pub use exchange::{Exchange, Exchanged};
 pub use gains::Gains;
 pub use held::{EXACT_FROM, Held};
 pub use lead::{Lead, Moving};

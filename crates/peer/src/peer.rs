@@ -14,7 +14,7 @@ use crate::operator::Seen;
 use crate::rotation::{Attitude, Rotation};
 use crate::tick::on_object;
 use crate::wire::{DecodeError, Extra, MAX_LEN, Sample, SampleKind};
-use crate::{Contact, Context, Device, Enclosure, Gains, Held, ObjectCopy, State, Strategy};
+use crate::{Contact, Context, Device, Enclosure, Exchange, Exchanged, Gains, Held, ObjectCopy, State, Strategy};
 
 /// Parameters of a peer, apart from device, copy of the object and strategy.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -33,6 +33,8 @@ pub struct PeerConfig {
     pub tick: Duration,
     /// `true` if forces have a compute delay: each force acts a tick after its computation.
     pub compute_delay: bool,
+    /// Ticks at which the peer reads the device and gives the device a new force.
+    pub exchange: Exchange,
     /// β [N·s/m], the damping of the copy by the strategy. Part of the copy's plant, and added to FT in the record.
     pub own_damping: f64,
     /// Walls around the object; `None` without walls.
@@ -63,6 +65,8 @@ pub struct Peer<const A: usize, D, S> {
     increments: Option<Box<Increments<A>>>,
     /// Rotation of copy and device, for an object with an inertia. Boxed, because most scenes do not rotate.
     rotation: Option<Box<Rotation>>,
+    /// State between two exchanges with the device; `None` with [`Exchange::EACH_TICK`]. Boxed, because most devices exchange at each tick.
+    exchanged: Option<Box<Exchanged<A>>>,
     /// `true` if a sample has changed since the last computation of the mean.
     stale_mean: bool,
     next_sequence: u64,
@@ -95,10 +99,10 @@ impl Asked {
     }
 }
 
-/// Forces that act over a tick: FC on the device, and the sum of forces on the copy.
+/// Forces that act over a tick: the coupling force on the device, and the sum of forces on the copy.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Acting<const A: usize> {
-    /// FC \[N\]. Acts on the device with the opposite sign.
+    /// FC \[N\], of the latest exchange if the device keeps a force for several ticks. Acts on the device with the opposite sign.
     pub coupling: [f64; A],
     /// Sum of all forces on the copy except its own damping \[N\]: FC − FT and the walls.
     pub on_object: [f64; A],
@@ -170,6 +174,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         let states = (0..held.len()).filter_map(|place| held.state(place).copied());
         let increments = sums.then(|| Box::new(Increments::new(states)));
         let (rotation, stale_mean, next_sequence) = (None, false, 0);
+        let exchanged = (config.exchange != Exchange::EACH_TICK).then(|| Box::new(Exchanged::new(device.state())));
         let tick_nanos = u64::try_from(config.tick.as_nanos()).unwrap_or(u64::MAX);
         let (computed, applied) = (none, none);
         Self {
@@ -181,6 +186,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
             held,
             increments,
             rotation,
+            exchanged,
             stale_mean,
             next_sequence,
             local_time,
@@ -190,10 +196,12 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         }
     }
 
-    /// Adds a rotating copy. The samples of such a peer carry attitudes, so its strategy must be a law without extra numbers.
+    /// Adds a rotating copy. The samples of such a peer carry attitudes, so its strategy must be a law without extra numbers. Torques have no exchanges, so the
+    /// peer must exchange with its device at each tick.
     #[must_use]
     pub fn with_rotation(mut self, rotation: Rotation) -> Self {
         debug_assert!(self.asked.kind == SampleKind::State, "samples with attitudes have no extra numbers");
+        debug_assert!(self.exchanged.is_none(), "torques act at each tick");
         self.rotation = Some(Box::new(rotation));
         (self.asked.kind, self.asked.any) = (SampleKind::Attitude, true);
         self
@@ -369,6 +377,9 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
             self.held.refresh();
             self.stale_mean = false;
         }
+        if let Some(exchanged) = &mut self.exchanged {
+            exchanged.read(self.config.exchange, self.device.state());
+        }
         // Before the copy is read: a client takes its copy from the newest sample of the server.
         let heard = if self.asked.any { self.heard() } else { None };
         let own = self.object.state();
@@ -394,6 +405,10 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
             self.applied = core::mem::replace(&mut self.computed, computed);
         } else {
             self.applied = computed;
+        }
+        // The copy feels FC of each tick, because both are parts of one program; the device keeps FC of its latest exchange.
+        if let Some(exchanged) = &mut self.exchanged {
+            self.applied.coupling = exchanged.hold(self.config.exchange, self.applied.coupling);
         }
         // β is part of the copy's plant and acts between ticks too; only the record adds it to FT.
         let damped = self.config.own_damping > 0.0;
@@ -511,6 +526,19 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         self.config.compute_delay
     }
 
+    /// Returns readings and force between two exchanges with the device; `None` with [`Exchange::EACH_TICK`].
+    #[must_use]
+    pub fn exchanged(&self) -> Option<&Exchanged<A>> {
+        self.exchanged.as_deref()
+    }
+
+    /// Replaces readings and force between two exchanges. Without effect with [`Exchange::EACH_TICK`].
+    pub fn set_exchanged(&mut self, exchanged: Exchanged<A>) {
+        if let Some(present) = &mut self.exchanged {
+            **present = exchanged;
+        }
+    }
+
     /// Replaces the forces computed at the latest tick.
     pub const fn set_computed(&mut self, computed: Acting<A>) {
         self.computed = computed;
@@ -600,7 +628,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         if contact == Contact::None {
             return [0.0; A];
         }
-        let device = self.device.state();
+        let device = self.exchanged.as_ref().map_or_else(|| self.device.state(), |exchanged| exchanged.reading);
         core::array::from_fn(|axis| contact.force_along(axis, &coupling, device.along(axis).relative_to(object.along(axis))))
     }
 }

@@ -22,6 +22,7 @@ impl Scene {
             coupling: self.coupling(place),
             tick: spec.clock.tick,
             compute_delay: spec.compute_delay,
+            exchange: spec.exchange,
             own_damping: self.own_damping(place),
             enclosure: self.object.enclosure,
         }

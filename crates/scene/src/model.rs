@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use cohaptic_peer::coordination::{LawSettings, Pull};
 use cohaptic_peer::rotation::Triple;
-use cohaptic_peer::{Clock, Contact, Coordination, DeviceConfig, Enclosure, Gains, Hand, Integrator, SendWhen, Signal};
+use cohaptic_peer::{Clock, Contact, Coordination, DeviceConfig, Enclosure, Exchange, Gains, Hand, Integrator, SendWhen, Signal};
 use cohaptic_units::{Instant, Probability};
 use cohaptic_wan::{DropCause, LinkModel};
 
@@ -276,6 +276,9 @@ pub struct PeerSpec {
     /// Mass mH and damping bH of the device. A peer of kind `udp` may have no device; only [`Scene::read_live`] accepts such a peer. The field then holds a
     /// device at rest: the peer touches nothing, and a live session never moves the device.
     pub device: DeviceConfig,
+    /// Ticks at which the peer reads the device and gives the device a new force. At most 100 ms from one such tick to the next; at each tick without delay
+    /// for a peer with `compute_delay`, and if the object turns.
+    pub exchange: Exchange,
     /// KC [N/m] and BC [N·s/m] of the virtual coupling as written, before scaling.
     pub coupling: Gains,
     /// Dependence of KC and BC on the number of peers.
@@ -297,14 +300,17 @@ pub struct PeerSpec {
 }
 
 impl fmt::Debug for PeerSpec {
-    /// Writes the initial state of the device only where the scene gives one: fingerprints of records are made of this text.
+    /// Writes the initial state of the device and its exchanges only where the scene gives them: fingerprints of records are made of this text.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, kind, clock, phase, compute_delay, contact, device, coupling, coupling_scaling, hand, .. } = self;
-        let Self { position, velocity, device_position, device_velocity, uplink, downlink, .. } = self;
+        let Self { exchange, position, velocity, device_position, device_velocity, uplink, downlink, .. } = self;
         let mut shown = f.debug_struct("PeerSpec");
         shown.field("name", name).field("kind", kind).field("clock", clock).field("phase", phase).field("compute_delay", compute_delay);
         shown.field("contact", contact).field("device", device).field("coupling", coupling).field("coupling_scaling", coupling_scaling);
         shown.field("hand", hand).field("position", position).field("velocity", velocity);
+        if *exchange != Exchange::EACH_TICK {
+            shown.field("exchange", exchange);
+        }
         for (name, start) in [("device_position", device_position), ("device_velocity", device_velocity)] {
             if let Some(start) = start {
                 shown.field(name, start);

@@ -1,7 +1,7 @@
 //! Limits of strategies: scenes in which a strategy cannot work, and the reasons.
 
 use cohaptic_peer::coordination::Law;
-use cohaptic_peer::{Coordination, Drift, Integrator};
+use cohaptic_peer::{Coordination, Drift, Exchange, Integrator};
 
 use crate::{ChangeKind, Scene};
 
@@ -49,6 +49,11 @@ impl Scene {
         }
         if (predicts || exchanges_waves || modulates) && self.peers.iter().any(|peer| peer.compute_delay) {
             return refuse("counts the energy of forces that act at once: expected no peer with a compute-delay of 1");
+        }
+        if strategy == Coordination::ClientServer && self.peers.iter().any(|peer| peer.exchange != Exchange::EACH_TICK) {
+            return refuse(
+                "sends the state of a device at each update and pulls the device at each tick: expected exchange-every = 1 and exchange-age = 0",
+            );
         }
         if (exchanges_waves || modulates) && self.integrator != Integrator::Exact {
             return refuse("damps each copy by just as much as it counts on: expected the integrator \"exact\"");

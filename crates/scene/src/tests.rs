@@ -3,6 +3,7 @@
 mod access;
 mod form;
 mod operators;
+mod slow_devices;
 mod strategies;
 mod task;
 mod topologies;

@@ -18,7 +18,7 @@ pub struct Analysis {
     /// Number of removed rigid-body modes: along each axis, displacements of all bodies together (with waves, of each copy alone) and of each device
     /// that touches nothing. Counted in the mode of contact with the largest radius; if the object turns, added over all its motions.
     pub rigid_modes: usize,
-    /// Number of remaining states: of bodies, of waiting forces, and of samples held or in flight.
+    /// Number of remaining states: of bodies, of waiting forces, of exchanges with devices, and of samples held or in flight.
     pub dimension: usize,
     /// Method by which the radius was found.
     pub method: Method,

@@ -105,6 +105,17 @@ pub enum AnalysisError {
         /// Name of the peer whose device the operator holds.
         peer: String,
     },
+    /// A device exchanges late or not at each tick, and this analysis does not follow such devices.
+    #[error(
+        "{what} does not follow the device of {peer}, which exchanges late or not at each tick: expected device.exchange-every = 1 and \
+         device.exchange-age = 0; `cohaptic stability point`, `map` and `boundary` follow such devices where links leave nothing to chance"
+    )]
+    SlowDevice {
+        /// Analysis that was asked for, in words.
+        what: &'static str,
+        /// Name of the peer with the device.
+        peer: String,
+    },
     /// The scene has a topology, and this analysis does not follow topologies.
     #[error(
         "{what} has every peer hear every other, and this scene has a [topology]: expected kind = \"full\"; \

@@ -14,6 +14,6 @@ pub use crate::lifted::{Autonomous, Body, FrameMap, Instrument, Lifted, Node, Op
 pub use crate::linear_form::{LawRow, LinearLaw};
 pub use crate::network::{LinkTiming, NominalNetwork};
 pub use crate::parts::{alone, lifted_part};
-pub use crate::pieces::{Piece, pieces, refuse_operators, refuse_topology};
+pub use crate::pieces::{Piece, pieces, refuse_operators, refuse_slow_devices, refuse_topology};
 pub use crate::structure::{Contacts, Structure, check_laws, classes, clocks, has_equal_clocks, links};
 pub use crate::timetable::{Event, Instants, NodeClock, Timetable, UseOfHeld};

@@ -11,7 +11,9 @@ use std::time::Duration;
 
 use cohaptic_peer::coordination::Role;
 use cohaptic_peer::wire::SampleKind;
-use cohaptic_peer::{Acting, Contact, Device as _, Gains, Hand, Held, ObjectCopy, Peer, Signal, SimulatedDevice, State, Strategy};
+use cohaptic_peer::{
+    Acting, Contact, Device as _, Exchange, Exchanged, Gains, Hand, Held, ObjectCopy, Peer, Signal, SimulatedDevice, State, Strategy,
+};
 use cohaptic_scene::{Scene, Strategies};
 use cohaptic_units::Instant;
 
@@ -120,6 +122,7 @@ fn error_of_known(scene: &Scene, structure: &Structure, time: f64) -> f64 {
             let spec = &scene.peers[peer];
             node.device = Some(Body::new(scene.device_plant(peer), scene.integrator, &spec.clock));
             node.coupling = Gains { stiffness: 0.0, damping: 0.0 };
+            node.exchange = Exchange::EACH_TICK;
         }
         node
     };
@@ -144,6 +147,8 @@ struct Pusher<const A: usize, S> {
     names: Vec<String>,
     timetable: Timetable,
     instants: Instants,
+    /// Number of ticks before the first exchange with the device in a frame, indexed by peer.
+    until: Vec<u32>,
     layout: Layout,
     /// Factor of velocities in the vector \[s\].
     time: f64,
@@ -188,6 +193,10 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             let mut config = scene.peer_config(place);
             config.contact = if contacts.touching[place] { Contact::Grasp } else { Contact::None };
             config.enclosure = None;
+            if !contacts.touching[place] {
+                // Exchanges of a device that touches nothing move nothing.
+                config.exchange = Exchange::EACH_TICK;
+            }
             // Stability does not depend on the outer force of a hand, so this force is zero here. The arm's impedance remains.
             let hand = spec.hand.as_ref().and_then(Hand::arm).map(|arm| Hand::Arm { arm, follows: Signal::Constant([0.0; 3]) });
             let device = SimulatedDevice::new(spec.device, hand.as_ref(), State::REST, scene.integrator, &spec.clock);
@@ -219,6 +228,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         Ok(Self {
             samples: vec![Vec::new(); peers],
             extras: vec![Vec::new(); peers],
+            until: ticks_until_exchange(&timetable),
             instants,
             members,
             people,
@@ -347,7 +357,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
                 Event::Deliver { from, to, sample } => {
                     self.hold((to, from, sample), begin_local, true);
                 }
-                Event::Tick { node, at, span } => {
+                Event::Tick { node, at, span, .. } => {
                     let now = begin.saturating_add_nanos(at);
                     let member = &mut self.members[node];
                     if let Some(person) = &mut self.people[node] {
@@ -427,6 +437,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
                 member.set_computed(Acting { coupling: force(next), on_object: force(next + A) });
                 next += 2 * A;
             }
+            next += restore_exchange(member, layout.exchange[place], self.until[place], &z[next..], self.time, self.compliance[place]);
             let memory: Vec<f64> = z[next..next + layout.memory[place]].iter().map(|number| number / self.remembered).collect();
             member.strategy_mut().set_memory(&memory);
             if let Some(person) = &mut self.people[place] {
@@ -464,6 +475,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             }
             next += 2 * A;
         }
+        next += read_exchange(member, layout.exchange[place], &mut z[next..], self.time, self.compliance[place]);
         for (entry, number) in z[next..next + layout.memory[place]].iter_mut().zip(member.strategy().memory()) {
             *entry = number * self.remembered;
         }
@@ -481,6 +493,65 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             }
         }
     }
+}
+
+/// Lets a peer at the beginning of a frame remember the exchanges with its device from the states `z`. `until` is the number of ticks until the next exchange.
+/// Returns the number of states.
+fn restore_exchange<const A: usize, S: Strategy<A>>(
+    member: &mut Member<A, S>,
+    exchange: Exchange,
+    until: u32,
+    z: &[f64],
+    time: f64,
+    compliance: f64,
+) -> usize {
+    let device = member.device().state();
+    let mut exchanged = Exchanged { reading: device, latest: device, held: [0.0; A], until };
+    let mut next = 0;
+    if exchange.late {
+        exchanged.latest = state(z, time);
+        next += 2 * A;
+    }
+    if exchange.holds() {
+        exchanged.reading = state(&z[next..], time);
+        exchanged.held = core::array::from_fn(|axis| z[next + 2 * A + axis] / compliance);
+        next += 3 * A;
+    }
+    member.set_exchanged(exchanged);
+    next
+}
+
+/// Writes what a peer remembers of the exchanges with its device to `z`, in the order of [`restore_exchange`]. Returns the number of states.
+fn read_exchange<const A: usize, S: Strategy<A>>(member: &Member<A, S>, exchange: Exchange, z: &mut [f64], time: f64, compliance: f64) -> usize {
+    let Some(exchanged) = member.exchanged() else { return 0 };
+    let mut next = 0;
+    if exchange.late {
+        write(&exchanged.latest, z, time);
+        next += 2 * A;
+    }
+    if exchange.holds() {
+        write(&exchanged.reading, &mut z[next..], time);
+        next += 2 * A;
+        for (entry, force) in z[next..].iter_mut().zip(exchanged.held) {
+            *entry = force * compliance;
+        }
+        next += A;
+    }
+    next
+}
+
+/// Returns the number of ticks of each node before its first exchange in the frame, indexed by node.
+fn ticks_until_exchange(timetable: &Timetable) -> Vec<u32> {
+    let mut until = vec![0; timetable.sent.len()];
+    let mut found = vec![false; timetable.sent.len()];
+    for event in &timetable.events {
+        if let Event::Tick { node, exchanges, .. } = *event
+            && !found[node]
+        {
+            (found[node], until[node]) = (exchanges, until[node] + u32::from(!exchanges));
+        }
+    }
+    until
 }
 
 /// Returns the matrix of commanded forces: one row per force in the given order, one column per state. Equal consecutive rows are kept once.

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use cohaptic_peer::Exchange;
 use cohaptic_scene::{RotationPart, RotationParts, Scene};
 
 use crate::AnalysisError;
@@ -60,6 +61,19 @@ pub(crate) fn pieces_with_operators<'a>(scene: &'a Scene, what: &'static str) ->
 pub fn refuse_operators(scene: &Scene, what: &'static str) -> Result<(), AnalysisError> {
     match Crossover::first_peer(scene) {
         Some(peer) => Err(AnalysisError::Operator { what, peer: scene.peers[peer].name.clone() }),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a scene in which a device exchanges late or not at each tick, for an analysis that does not follow such devices. `what` names the analysis in
+/// errors. Devices of peers that touch nothing count too.
+///
+/// # Errors
+///
+/// [`AnalysisError::SlowDevice`] with the name of the first peer with such a device.
+pub fn refuse_slow_devices(scene: &Scene, what: &'static str) -> Result<(), AnalysisError> {
+    match scene.peers.iter().find(|peer| peer.exchange != Exchange::EACH_TICK) {
+        Some(peer) => Err(AnalysisError::SlowDevice { what, peer: peer.name.clone() }),
         None => Ok(()),
     }
 }

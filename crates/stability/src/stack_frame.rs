@@ -6,7 +6,7 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::{Gains, Motion, StepMap, tick};
+use cohaptic_peer::{Exchange, Gains, Motion, StepMap, tick};
 
 use crate::Matrix;
 use crate::lifted::node::{Scale, coordination_of};
@@ -54,12 +54,12 @@ pub(crate) struct StackNode<'a> {
 }
 
 impl<'a> StackNode<'a> {
-    /// Returns the only node of a system, if the frame can be computed on the stack: forces act without a delay, no operator moves the hand, and the law is a
-    /// pull towards the mean with gains not both zero. `None` for any other system.
+    /// Returns the only node of a system, if the frame can be computed on the stack: forces act without a delay, the device exchanges at each tick, no operator
+    /// moves the hand, and the law is a pull towards the mean with gains not both zero. `None` for any other system.
     pub(crate) fn of(lifted: &Lifted<'a>) -> Option<Self> {
         let [node] = lifted.nodes else { return None };
         let coordination = node.law.pull().filter(|gains| gains.stiffness + gains.damping > 0.0)?;
-        if node.compute_delay || node.operator.is_some() {
+        if node.compute_delay || node.operator.is_some() || node.exchanges() != Exchange::EACH_TICK {
             return None;
         }
         Some(Self { node, weight: lifted.weights[(0, 0)], coordination, time: lifted.time, tied: lifted.tied })

@@ -28,6 +28,16 @@ pub enum StateKind {
     PendingCoupling { axis: usize },
     /// The force on the copy that acts next, if forces are applied a tick late.
     PendingForce { axis: usize },
+    /// Position of the device at the latest exchange, if readings are late.
+    LatestPosition { axis: usize },
+    /// Velocity of the device at the latest exchange, if readings are late.
+    LatestVelocity { axis: usize },
+    /// Position in the reading that the coupling uses, if the device does not exchange at each tick.
+    ReadingPosition { axis: usize },
+    /// Velocity in the reading that the coupling uses, if the device does not exchange at each tick.
+    ReadingVelocity { axis: usize },
+    /// Coupling force that the device keeps, if the device does not exchange at each tick.
+    KeptCoupling { axis: usize },
     /// A number that the strategy remembers.
     Memory { number: usize },
     /// Position at which the arm of an operator wants the device at the next tick.
@@ -78,6 +88,11 @@ impl fmt::Display for StateKind {
             Self::ObjectVelocity { axis: a } => write!(f, "copy velocity {}", axis(a)),
             Self::PendingCoupling { axis: a } => write!(f, "coupling force to come {}", axis(a)),
             Self::PendingForce { axis: a } => write!(f, "force on the copy to come {}", axis(a)),
+            Self::LatestPosition { axis: a } => write!(f, "device position at the latest exchange {}", axis(a)),
+            Self::LatestVelocity { axis: a } => write!(f, "device velocity at the latest exchange {}", axis(a)),
+            Self::ReadingPosition { axis: a } => write!(f, "device position as read {}", axis(a)),
+            Self::ReadingVelocity { axis: a } => write!(f, "device velocity as read {}", axis(a)),
+            Self::KeptCoupling { axis: a } => write!(f, "coupling force that the device keeps {}", axis(a)),
             Self::Memory { number } => write!(f, "memory {number} of the strategy"),
             Self::WantedPosition { axis: a } => write!(f, "wanted position {}", axis(a)),
             Self::SeenPosition { axis: a, age } => write!(f, "position {} seen {age} ticks before", axis(a)),

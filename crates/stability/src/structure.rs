@@ -176,6 +176,7 @@ impl Structure {
             law,
             wall: scene.object.enclosure.filter(|_| self.at_wall).map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping }),
             compute_delay: spec.compute_delay,
+            exchange: spec.exchange,
             keeps_whole_past: false,
         }
     }
@@ -348,11 +349,11 @@ pub fn links(classes: &[Vec<usize>], network: &NominalNetwork) -> Vec<(usize, us
 /// Tells whether two peers move by the same equations. The coupling is compared only if the peers touch the object.
 fn alike(one: &PeerSpec, other: &PeerSpec, touching: bool) -> bool {
     // Bodies integrate per tick of their clock, so peers with different clocks or phases move differently even with equal parameters.
-    let same_clock = (one.clock, one.phase, one.compute_delay) == (other.clock, other.phase, other.compute_delay);
+    let clock = |spec: &PeerSpec| (spec.clock, spec.phase, spec.compute_delay, spec.exchange);
     let plant = |spec: &PeerSpec| spec.device.plant(spec.hand.as_ref());
     let same_device = || (one.device, plant(one)) == (other.device, plant(other));
     let same_coupling = || (one.coupling, one.coupling_scaling) == (other.coupling, other.coupling_scaling);
-    same_clock && same_device() && (!touching || same_coupling())
+    clock(one) == clock(other) && same_device() && (!touching || same_coupling())
 }
 
 /// Tells whether two peers turn by the same equations. True if the object does not turn.

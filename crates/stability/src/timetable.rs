@@ -1,6 +1,7 @@
 //! The events of one frame in their order: samplings, deliveries and ticks of all nodes.
 //!
-//! A frame is the period of all events: the least common multiple of all periods of sending, of drifting clocks and of the patterns of links.
+//! A frame is the period of all events: the least common multiple of all periods of sending, of exchanges with devices, of drifting clocks and of the patterns
+//! of links.
 //! Events within a frame have the order of a simulation: at one instant first samplings, then deliveries, then ticks, each in the order of nodes. The
 //! frame begins so late that all peers have started and all samples in flight belong to the pattern.
 
@@ -24,6 +25,8 @@ pub struct NodeClock {
     pub(crate) phase: u64,
     /// Number of ticks from one sampling to the next.
     pub every: u64,
+    /// Number of ticks from one exchange with the device to the next; tick 0 has an exchange.
+    pub exchange: u64,
 }
 
 impl NodeClock {
@@ -32,7 +35,7 @@ impl NodeClock {
     pub fn of(scene: &Scene, place: usize) -> Self {
         let spec = &scene.peers[place];
         let every = scene.coordination.update.as_nanos() / spec.clock.tick.as_nanos();
-        Self { clock: spec.clock, phase: spec.phase, every: u64::try_from(every).unwrap_or(u64::MAX) }
+        Self { clock: spec.clock, phase: spec.phase, every: u64::try_from(every).unwrap_or(u64::MAX), exchange: u64::from(spec.exchange.every) }
     }
 
     /// Returns the tick of `to`, counted from its first tick in the frame, at the arrival of the first sample of the frame after `delay`. Also returns the
@@ -58,9 +61,14 @@ impl NodeClock {
 
     /// Returns the smallest number of periods of sending with a total of whole nanoseconds, as (span \[ns\], number). `None` if the numbers overflow.
     fn repeats(&self) -> Option<(u128, u128)> {
-        let sending = self.clock.tick.as_nanos().checked_mul(u128::from(self.every))?.checked_mul(1_000_000_000)?;
-        let common = gcd(sending, self.speed());
-        Some((sending / common, self.speed() / common))
+        self.repeats_after(self.every)
+    }
+
+    /// Returns the smallest number of periods of `ticks` ticks with a total of whole nanoseconds, as (span \[ns\], number). `None` if the numbers overflow.
+    fn repeats_after(&self, ticks: u64) -> Option<(u128, u128)> {
+        let period = self.clock.tick.as_nanos().checked_mul(u128::from(ticks))?.checked_mul(1_000_000_000)?;
+        let common = gcd(period, self.speed());
+        Some((period / common, self.speed() / common))
     }
 
     /// Returns the instant of tick k \[ns\]. Negative k are allowed, as if the clock had always run.
@@ -120,6 +128,8 @@ pub enum Event {
         at: u64,
         /// Span until the node's next tick.
         span: Duration,
+        /// `true` if the node exchanges with its device at this tick.
+        exchanges: bool,
     },
 }
 
@@ -194,7 +204,9 @@ impl Timetable {
                     count += 1;
                 }
                 let span = Duration::from_nanos(u64::try_from(clock.instant(tick + 1) - at).map_err(|_| AnalysisError::NoFrame)?);
-                events.push((at, 2, node, 0, 0, Event::Tick { node, at: u64::try_from(at).map_err(|_| AnalysisError::NoFrame)?, span }));
+                let (since_begin, exchanges) =
+                    (u64::try_from(at).map_err(|_| AnalysisError::NoFrame)?, tick.rem_euclid(i128::from(clock.exchange)) == 0);
+                events.push((at, 2, node, 0, 0, Event::Tick { node, at: since_begin, span, exchanges }));
                 tick += 1;
             }
             sent.push(count);
@@ -363,8 +375,10 @@ fn arrivals(from: &NodeClock, to: &NodeClock, timing: &LinkTiming, first: i128, 
 fn frame(clocks: &[NodeClock], links: &[(usize, usize, LinkTiming)]) -> Result<u128, AnalysisError> {
     let mut frame = 1_u128;
     for clock in clocks {
-        let (span, _) = clock.repeats().ok_or(AnalysisError::NoFrame)?;
-        frame = lcm(frame, span).ok_or(AnalysisError::NoFrame)?;
+        for ticks in [clock.every, clock.exchange] {
+            let (span, _) = clock.repeats_after(ticks).ok_or(AnalysisError::NoFrame)?;
+            frame = lcm(frame, span).ok_or(AnalysisError::NoFrame)?;
+        }
     }
     for (from, _, timing) in links {
         if let LinkTiming::Pattern(pattern) = timing {

@@ -45,8 +45,8 @@ pub(crate) fn felt(matrix: &Matrix, forces: &Matrix, states: &[StateName]) -> (M
     }
 }
 
-/// Tells whether bodies feel a state only through later forces of strategies: memory and samples, not positions, velocities, pending forces or what an operator
-/// remembers.
+/// Tells whether bodies feel a state only through later forces of strategies: memory and samples, not positions, velocities, pending forces, exchanges with
+/// devices or what an operator remembers.
 const fn is_hidden(kind: StateKind) -> bool {
     match kind {
         StateKind::DevicePosition { .. }
@@ -55,6 +55,11 @@ const fn is_hidden(kind: StateKind) -> bool {
         | StateKind::ObjectVelocity { .. }
         | StateKind::PendingCoupling { .. }
         | StateKind::PendingForce { .. }
+        | StateKind::LatestPosition { .. }
+        | StateKind::LatestVelocity { .. }
+        | StateKind::ReadingPosition { .. }
+        | StateKind::ReadingVelocity { .. }
+        | StateKind::KeptCoupling { .. }
         | StateKind::WantedPosition { .. }
         | StateKind::SeenPosition { .. } => false,
         StateKind::Memory { .. }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use cohaptic_peer::coordination::{BuiltIn, Law};
 use cohaptic_peer::wire::SampleKind;
-use cohaptic_peer::{Coordination, EXACT_FROM};
+use cohaptic_peer::{Coordination, EXACT_FROM, Exchange};
 use cohaptic_scene::{Change, ChangeKind, Scene, Strategies, Topology};
 use cohaptic_units::print::Span;
 use cohaptic_units::{Bytes, Instant};
@@ -143,6 +143,7 @@ impl Shape {
             (scene.peers.iter().all(|peer| peer.clock.tick == clock.tick), "the ticks of peers differ in length"),
             (scene.rotation.is_none(), "the object turns"),
             (!(0..scene.peers.len()).any(|peer| scene.operator(peer).is_some()), "an operator sees and moves at each tick"),
+            (scene.peers.iter().all(|peer| peer.exchange == Exchange::EACH_TICK), "a device exchanges late, or not at each tick"),
             (plan.ticking == Ticking::Lockstep, "peers tick at instants of their own, by offsets or drifts"),
             (links.iter().all(|(link, _)| !link.may_damage()), "a link damages packets"),
             (models_to_come(scene).all(|link| !link.may_damage()), "the timeline makes a link damage packets"),
@@ -292,6 +293,8 @@ coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
                     .to_owned(),
                 "an operator sees and moves",
             ),
+            ("peer={ contact = \"none\", device = { mass = 1, exchange-every = 2 } }".to_owned(), "exchanges late, or not at each tick"),
+            ("peer={ contact = \"none\", device = { mass = 1, exchange-age = 1 } }".to_owned(), "exchanges late, or not at each tick"),
             ("coordination.strategy=\"wave\"\ncoordination.wave.impedance=1".to_owned(), "not a law"),
             (
                 "peer.contact=\"grasp\"\npeer.coupling.stiffness=1\ntask={ kind = \"hold\", target = 0, radius = 1, end = \"stop\" }".to_owned(),

@@ -5,7 +5,7 @@ mod operators;
 mod tests;
 
 use cohaptic_peer::coordination::{Law, LawValue, Pull, UsedGains};
-use cohaptic_peer::{Contact, Hand, Integrator, SendWhen};
+use cohaptic_peer::{Contact, Exchange, Hand, Integrator, SendWhen};
 use cohaptic_scene::{Axes, FromScene, PeerSpec, RotationPart, RotationParts, Scaling, Scene, TopologyKind};
 use cohaptic_units::print::{Counted, Number, Span};
 use cohaptic_wan::LinkModel;
@@ -396,7 +396,23 @@ fn describe(peer: &PeerSpec) -> String {
         Some(Hand::Arm { .. }) => "an arm, its spring and damper part of the plant",
         Some(Hand::Operator { .. }) => "the arm of an operator, its spring and damper part of the plant",
     };
-    format!("device of {} kg that {contact}, {hand}", Number(peer.device.mass))
+    format!("device of {} kg that {contact}, {hand}{}", Number(peer.device.mass), exchanges(peer.exchange))
+}
+
+/// Returns the text about a device that exchanges late, or not at each tick, as a continuation of a sentence; empty for other devices.
+fn exchanges(exchange: Exchange) -> String {
+    let every = match exchange.every {
+        1 => "each tick".to_owned(),
+        every => format!("every {every} ticks"),
+    };
+    match exchange {
+        Exchange::EACH_TICK => String::new(),
+        Exchange { late: false, .. } => format!(", read {every}; it keeps the force of an exchange until the next"),
+        Exchange { every: 1, late: true } => ", read each tick, and felt by the coupling a tick later".to_owned(),
+        Exchange { late: true, .. } => {
+            format!(", read {every} and felt by the coupling an exchange later; it keeps the force of an exchange until the next")
+        }
+    }
 }
 
 /// Returns the configurations of the links between different peers, each with the number of links.

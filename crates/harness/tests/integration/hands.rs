@@ -35,10 +35,15 @@ impl LiveDevice for Told {
 }
 
 fn duo() -> Written {
+    duo_with("")
+}
+
+/// Two peers, with further keys of their devices.
+fn duo_with(device: &str) -> Written {
     read(format!(
         "scene = {{ duration = \"3s\" }}\nobject = {{ mass = 0.4, damping = 2.0 }}\n\
          coordination = {{ strategy = \"average-position\", stiffness = 500.0, damping = 5.0, update = \"8ms\" }}\n\
-         peer = {{ device = {{ mass = 0.1, damping = 5.0 }}, coupling = {{ stiffness = {COUPLING}, damping = 0.0 }} }}\n\
+         peer = {{ device = {{ mass = 0.1, damping = 5.0{device} }}, coupling = {{ stiffness = {COUPLING}, damping = 0.0 }} }}\n\
          peers = [{{ name = \"here\", contact = \"none\" }}, {{ name = \"hand\", kind = \"falcon\" }}]\nlink = {{ delay = \"4ms\" }}\n"
     ))
 }
@@ -66,10 +71,13 @@ impl Observer for Forces {
 }
 
 fn run(shows: fn(u64) -> Option<f64>) -> (Forces, Vec<(Instant, [f64; 3])>, LiveScene) {
-    let Written { scene, .. } = duo();
+    run_of(&duo(), shows)
+}
+
+fn run_of(Written { scene, .. }: &Written, shows: fn(u64) -> Option<f64>) -> (Forces, Vec<(Instant, [f64; 3])>, LiveScene) {
     let held = Arc::new(Mutex::new(Vec::new()));
     let device = Arc::clone(&held);
-    let mut live = LiveScene::new(&scene, |place| {
+    let mut live = LiveScene::new(scene, |place| {
         assert_eq!(place, 1, "only the falcon has one");
         Some(Box::new(Told { shows, held: Arc::clone(&device) }))
     });
@@ -118,6 +126,29 @@ fn a_device_takes_hold_and_lets_go_little_by_little() {
     assert_eq!(at(2400).1, 0.0);
     assert_eq!(live.seat_stats(1).unwrap().joined, 2);
     assert_eq!(live.presence(1), Some(Presence::Stale(millis(1999))));
+}
+
+/// Position of a hand that moves on by 1 mm every 4 ms \[m\].
+fn read_at(millisecond: u64) -> f64 {
+    0.001 * f64::from(u32::try_from(millisecond / 4).unwrap())
+}
+
+/// Exchanges every 4 ms, with readings of the exchange before. The device has a new force at each exchange, which is FC of this tick. FC acts on the copy at
+/// each tick.
+#[test]
+fn a_slow_device_is_told_a_new_force_at_its_exchanges_alone() {
+    let (forces, held, _) = run_of(&duo_with(", exchange-every = 4, exchange-age = 1"), |t| Some(read_at(t)));
+    let mut changes = 0;
+    for (tick, ((at, force), (_, computed, x))) in (0_u64..).zip(held.iter().zip(&forces.0)) {
+        let exchange = tick / 4 * 4;
+        assert_eq!((*at, force[0]), (millis(tick), forces.0[usize::try_from(exchange).unwrap()].1), "tick {tick}");
+        // The pull of a hand that has just taken hold is whole after a quarter of a second.
+        if tick >= 300 {
+            assert!((computed - COUPLING * (read_at(tick - 4) - x)).abs() < 1e-9, "tick {tick}: {computed} N");
+            changes += usize::from(tick > exchange && computed.to_bits() != force[0].to_bits());
+        }
+    }
+    assert!(changes > 1000, "{changes}");
 }
 
 #[test]

@@ -151,3 +151,18 @@ fn operators_are_the_same_live() {
     let scene = Scene::parse(text, Path::new("operators.toml"), &[]).unwrap();
     same(&scene, &[370_000, 1_000_000, 2_500_000]).unwrap();
 }
+
+/// Simulated devices exchange in a session at the ticks at which they exchange in virtual time.
+#[test]
+fn slow_devices_are_the_same_live() {
+    let text = r#"
+        scene = { duration = "300ms", seed = 5 }
+        object = { mass = 0.45 }
+        coordination = { strategy = "average-position", stiffness = 500.0, damping = 5.0, update = "8ms" }
+        peer = { device = { mass = 0.1, damping = 5.0, exchange-every = 3 }, coupling = { stiffness = 900.0, damping = 5.0 }, hand = { force = 1.0 } }
+        peers = [{ name = "left", device.exchange-age = 1 }, { name = "right", clock.offset = "1.3ms" }]
+        link = { delay = "24ms", jitter = "3ms", loss = "5%" }
+    "#;
+    let scene = Scene::parse(text, Path::new("slow.toml"), &[]).unwrap();
+    same(&scene, &[370_000, 1_000_000, 2_500_000]).unwrap();
+}

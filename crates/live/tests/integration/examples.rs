@@ -10,8 +10,8 @@ use std::net::UdpSocket;
 
 use cohaptic_peer::rotation::{Attitude, HeldAttitudes, Rotation, RotationConfig, Spin};
 use cohaptic_peer::{
-    Clock, Contact, Coordination, CopyConfig, DeviceConfig, Gains, Hand, Held, Integrator, ObjectCopy, Peer, PeerConfig, Signal, SimulatedDevice,
-    State,
+    Clock, Contact, Coordination, CopyConfig, DeviceConfig, Exchange, Gains, Hand, Held, Integrator, ObjectCopy, Peer, PeerConfig, Signal,
+    SimulatedDevice, State,
 };
 use cohaptic_units::Instant;
 use std::time::Duration;
@@ -71,6 +71,7 @@ impl Mechanics {
             coupling: self.coupling,
             tick,
             compute_delay: false,
+            exchange: Exchange::EACH_TICK,
             own_damping: 0.0,
             enclosure: None,
         };

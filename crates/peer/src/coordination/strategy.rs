@@ -70,7 +70,7 @@ pub struct Command<const A: usize> {
 /// use core::time::Duration;
 ///
 /// use cohaptic_peer::{
-///     Clock, Command, Contact, Context, CopyConfig, DeviceConfig, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, SimulatedDevice, State,
+///     Clock, Command, Contact, Context, CopyConfig, DeviceConfig, Exchange, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, SimulatedDevice, State,
 ///     Strategy, wire::MAX_LEN,
 /// };
 /// use cohaptic_units::Instant;
@@ -104,6 +104,7 @@ pub struct Command<const A: usize> {
 ///     coupling: Gains { stiffness: 3500.0, damping: 5.0 },
 ///     tick,
 ///     compute_delay: false,
+///     exchange: Exchange::EACH_TICK,
 ///     own_damping: 0.0,
 ///     enclosure: None,
 /// };

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use cohaptic_peer::wire::Sample;
 use cohaptic_peer::{
-    Age, Ages, Clock, Contact, Coordination, CopyConfig, Forces, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, RestingDevice, State,
-    coordination::LawStrategy,
+    Age, Ages, Clock, Contact, Coordination, CopyConfig, Exchange, Forces, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, RestingDevice,
+    State, coordination::LawStrategy,
 };
 use cohaptic_units::Instant;
 use proptest::collection::vec;
@@ -53,6 +53,7 @@ fn receiver(peers: usize, own: f64) -> Receiver {
         coupling: GAINS,
         tick: TICK,
         compute_delay: false,
+        exchange: Exchange::EACH_TICK,
         own_damping: 0.0,
         enclosure: None,
     };

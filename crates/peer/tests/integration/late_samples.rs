@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use cohaptic_peer::wire::MAX_LEN;
 use cohaptic_peer::{
-    Clock, Contact, Coordination, CopyConfig, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, ReceiveError, Reception, RestingDevice, State,
-    coordination::LawStrategy, wire::Sample,
+    Clock, Contact, Coordination, CopyConfig, Exchange, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, ReceiveError, Reception,
+    RestingDevice, State, coordination::LawStrategy, wire::Sample,
 };
 use cohaptic_units::Instant;
 use proptest::collection::vec;
@@ -27,6 +27,7 @@ fn receiver() -> Receiver {
         coupling: gains,
         tick: Duration::from_millis(1),
         compute_delay: false,
+        exchange: Exchange::EACH_TICK,
         own_damping: 0.0,
         enclosure: None,
     };

@@ -11,6 +11,7 @@ mod laws;
 mod local_lag;
 mod own_parts;
 mod rotation;
+mod slow_device;
 mod smoothed_average_position;
 mod step_map;
 mod turning_energy;

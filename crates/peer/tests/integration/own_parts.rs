@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use cohaptic_peer::wire::{MAX_LEN, Sample};
-use cohaptic_peer::{Clock, Command, Contact, Context, CopyConfig, Device, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, State, Strategy};
+use cohaptic_peer::{
+    Clock, Command, Contact, Context, CopyConfig, Device, Exchange, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, State, Strategy,
+};
 use cohaptic_units::Instant;
 
 /// A device whose position follows a script, and which records the forces on it.
@@ -44,6 +46,10 @@ impl Strategy<1> for FollowTheFirst {
 }
 
 fn peer<D: Device<1>, S: Strategy<1>>(device: D, strategy: S, compute_delay: bool) -> Peer<1, D, S> {
+    exchanging(device, strategy, compute_delay, Exchange::EACH_TICK)
+}
+
+fn exchanging<D: Device<1>, S: Strategy<1>>(device: D, strategy: S, compute_delay: bool, exchange: Exchange) -> Peer<1, D, S> {
     let coupling = Gains { stiffness: 2.0, damping: 0.0 };
     let config = PeerConfig {
         session: 0,
@@ -53,6 +59,7 @@ fn peer<D: Device<1>, S: Strategy<1>>(device: D, strategy: S, compute_delay: boo
         coupling,
         tick: Duration::from_millis(1),
         compute_delay,
+        exchange,
         own_damping: 0.0,
         enclosure: None,
     };
@@ -80,6 +87,27 @@ fn a_device_feels_the_coupling_force_of_its_tick_or_of_the_one_before() {
         assert_eq!(felt, expected, "compute-delay {compute_delay}");
         assert_eq!(peer.device().felt[3].0, at(3));
         assert_eq!(peer.device().felt[3].1, Duration::from_millis(1));
+    }
+}
+
+/// The device is at 0, 1, 2, … m at its ticks and the copy rests at 0, so FC is KC = 2 N/m times the reading.
+#[test]
+fn a_slow_device_is_read_at_its_exchanges_and_keeps_their_force() {
+    for (every, late, expected) in [
+        (1, true, [0.0, 0.0, 2.0, 4.0, 6.0, 8.0, 10.0]),
+        (2, false, [0.0, 0.0, 4.0, 4.0, 8.0, 8.0, 12.0]),
+        (2, true, [0.0, 0.0, 0.0, 0.0, 4.0, 4.0, 8.0]),
+        (3, false, [0.0, 0.0, 0.0, 6.0, 6.0, 6.0, 12.0]),
+    ] {
+        let mut peer = exchanging(Scripted::default(), FollowTheFirst { stiffness: 0.0, asked: Vec::new() }, false, Exchange { every, late });
+        let coupling = (0..7).map(|tick| {
+            let [force] = peer.compute(at(tick)).coupling;
+            peer.advance(at(tick), Duration::from_millis(1));
+            force
+        });
+        let coupling = coupling.collect::<Vec<f64>>();
+        let felt: Vec<f64> = peer.device().felt.iter().map(|(_, _, force)| *force).collect();
+        assert_eq!((coupling.as_slice(), felt.as_slice()), (&expected[..], &expected[..]), "every {every}, late {late}");
     }
 }
 

@@ -6,8 +6,8 @@
 
 use std::fmt::Write as _;
 
-use cohaptic_peer::Gains;
-use cohaptic_scene::TopologyKind;
+use cohaptic_peer::{Exchange, Gains};
+use cohaptic_scene::{Scene, TopologyKind};
 use cohaptic_stability::frames::{eigenvectors, weights_of};
 use cohaptic_stability::{Family, Matrix};
 
@@ -33,6 +33,14 @@ impl BoxCertificate {
     pub(super) fn new(ranges: Vec<[f64; 2]>, proven: Proven, parts: Vec<(Proven, PartCertificate)>) -> Self {
         Self { ranges, guarantee: proven.into(), parts: needed(Some(proven), parts) }
     }
+}
+
+/// Refuses a certificate of a scene with features that the checker of certificates does not derive.
+pub(super) fn refuse_certificate(scene: &Scene) -> Result<(), ProofError> {
+    if scene.peers.iter().any(|peer| peer.exchange != Exchange::EACH_TICK) {
+        return Err(ProofError::NoCertificate { what: "a device that exchanges late or not at each tick" });
+    }
+    Ok(())
 }
 
 /// Returns the number of boxes of an answer with a verdict in the answer and without a verdict in the certificate, because the certificate's bounds of frames

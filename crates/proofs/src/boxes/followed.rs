@@ -8,7 +8,7 @@ use cohaptic_stability::numerics::real;
 use cohaptic_stability::{AnalysisError, Family, FamilyError, Graph, GraphError, Matrix, Verdict, Watch, has_chance};
 use rayon::prelude::*;
 
-use super::certificate::{BoxCertificate, Certified, Named, PartCertificate};
+use super::certificate::{BoxCertificate, Certified, Named, PartCertificate, refuse_certificate};
 use super::corners::{Common, Point, doubled, steps};
 use super::delays;
 use super::discs::decide;
@@ -298,6 +298,8 @@ pub(super) fn certify(
     boxes: Vec<Vec<[f64; 2]>>,
     watch: &dyn Watch,
 ) -> Result<Vec<BoxCertificate>, ProofError> {
+    let lows: Vec<f64> = family.keys().iter().map(|key| key.low).collect();
+    refuse_certificate(&family.scene(&lows)?)?;
     let followed = Followed::new(family, every)?;
     watch.expects(real(boxes.len()));
     let certificates = boxes.into_par_iter().map(|ranges| {

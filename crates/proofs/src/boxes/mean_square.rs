@@ -400,6 +400,7 @@ fn moved(
         }
     }
     if let Some(span) = span {
+        // Every tick has an exchange, because the mean square is refused for slow devices.
         // A peer hears the mean of its held samples, the first held row: h for the common motion, `in` for the differences.
         let mut heard = Matrix::zeros(1 + node.law.memory.len(), size);
         for (row, by) in node.heard(sampling, 0, 0.0, scale.time).enumerate() {
@@ -407,7 +408,7 @@ fn moved(
         }
         let mut scratch = Scratch::default();
         scratch.resize(size);
-        node.tick(&mut z, own, |row| heard.row(row), External::default(), span, scale, &mut scratch);
+        node.tick(&mut z, own, |row| heard.row(row), External::default(), (span, true), scale, &mut scratch);
     }
     StepMatrix { matrix: z, error: error(std::slice::from_ref(node), scale, 0.0) }
 }

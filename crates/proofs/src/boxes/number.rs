@@ -2,10 +2,10 @@
 //! as far from the limit as a rounding, if there is a limit.
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::frames::{NominalNetwork, refuse_topology};
+use cohaptic_stability::frames::{NominalNetwork, refuse_slow_devices, refuse_topology};
 use cohaptic_stability::{AnalysisError, Watch, has_chance};
 
-use super::certificate::{NumberCertificate, needed};
+use super::certificate::{NumberCertificate, needed, refuse_certificate};
 use super::error::ProofError;
 use super::growing::{ENDLESS, Growing, PartPlace};
 use super::guarantee::{Guarantee, Proven};
@@ -112,6 +112,9 @@ impl NumberProof {
             return Err(ProofError::Numbers);
         }
         refuse_topology(scene, "the proof for every number of peers")?;
+        if has_chance(scene) {
+            refuse_slow_devices(scene, "the mean square")?;
+        }
         let network = NominalNetwork::of(scene)?;
         let growing = Growing::new(scene, &network)?;
         if growing.has_waves() && has_chance(scene) {
@@ -281,8 +284,10 @@ impl EveryNumber {
     ///
     /// # Errors
     ///
-    /// [`ProofError`] if the watch ends the certification, and for the reasons of [`prove_every_number`] if `scene` is not the proven scene.
+    /// [`ProofError`] if the watch ends the certification, if a device exchanges late or not at each tick, and for the reasons of [`prove_every_number`] if
+    /// `scene` is not the proven scene.
     pub fn certify(&self, scene: &Scene, watch: &dyn Watch) -> Result<Vec<NumberCertificate>, ProofError> {
+        refuse_certificate(scene)?;
         let network = NominalNetwork::of(scene)?;
         let growing = Growing::new(scene, &network)?;
         let moments = self.is_mean_square.then(|| GrowingMoments::new(&growing, &network)).transpose()?;

@@ -107,7 +107,7 @@ impl Frame<'_> {
                     sent[node] += 1;
                     (None, vec![operation])
                 }
-                Event::Tick { node, at, span } => {
+                Event::Tick { node, at, span, .. } => {
                     let operations = self.tick(node, ticks[node], span);
                     ticks[node] += 1;
                     (Some(at), operations)

@@ -19,6 +19,8 @@ type SampleName = (usize, i64);
 struct Tick {
     node: usize,
     span: Duration,
+    /// `true` if the node exchanges with its device at the tick.
+    exchanges: bool,
     /// Held samples, each with its age \[s\]; the age is 0 where laws do not use ages.
     held: Vec<(SampleName, f64)>,
 }
@@ -57,8 +59,8 @@ struct StepKind {
     before: usize,
     /// Nodes that take samples, in order.
     taken: Vec<usize>,
-    /// Nodes that tick, with the duration of the tick and the held samples.
-    ticks: Vec<(usize, Duration, Vec<HeldKind>)>,
+    /// Nodes that tick, with the duration of the tick, whether the node exchanges with its device, and the held samples.
+    ticks: Vec<(usize, Duration, bool, Vec<HeldKind>)>,
     /// Places of the samples that are states after the step.
     after: Vec<Option<usize>>,
 }
@@ -71,7 +73,7 @@ impl Step {
         StepKind {
             before: before.len(),
             taken: self.samples.iter().map(|name| name.0).collect(),
-            ticks: self.ticks.iter().map(|tick| (tick.node, tick.span, held(tick))).collect(),
+            ticks: self.ticks.iter().map(|tick| (tick.node, tick.span, tick.exchanges, held(tick))).collect(),
             after: after.iter().map(place).collect(),
         }
     }
@@ -148,7 +150,7 @@ pub enum FrameState {
         /// `true` if the other peers receive the waves, instead of the class.
         of_others: bool,
     },
-    /// Force waiting for the next tick, or number of a law's memory.
+    /// Force waiting for the next tick, reading or force between two exchanges with a device, or number of a law's memory.
     Other {
         /// The place of the class.
         class: usize,
@@ -204,7 +206,7 @@ impl Plan {
                         held[to].insert(from, sample);
                     }
                 }
-                Event::Tick { node, at, span } => {
+                Event::Tick { node, at, span, exchanges } => {
                     // Ticks of one instant share a step. A node ticks at most once in a step, since two ticks of a node would multiply its gains.
                     if steps.last().is_none_or(|step| step.ticks.iter().any(|tick| tick.node == node) || !step.ticks.is_empty() && step.at != at) {
                         steps.push(Step::default());
@@ -214,7 +216,7 @@ impl Plan {
                     oldest = held.iter().fold(oldest, |oldest, (_, age)| oldest.max(*age));
                     if let Some(step) = steps.last_mut() {
                         step.at = at;
-                        step.ticks.push(Tick { node, span, held });
+                        step.ticks.push(Tick { node, span, exchanges, held });
                     }
                 }
             }
@@ -292,7 +294,7 @@ impl Plan {
         let law_rows = 1 + nodes.iter().map(|node| node.law.memory.len()).max().unwrap_or(0);
         let mut scratch = Scratch::default();
         scratch.resize(columns);
-        for Tick { node, span, held } in ticks {
+        for Tick { node, span, exchanges, held } in ticks {
             let mut heard = Matrix::zeros(law_rows, columns);
             for (name, age) in held {
                 let Some(sample) = store.get(name) else { continue };
@@ -303,7 +305,7 @@ impl Plan {
                     }
                 }
             }
-            nodes[*node].tick(&mut z, rows[*node], |row| heard.row(row), External::default(), *span, scale, &mut scratch);
+            nodes[*node].tick(&mut z, rows[*node], |row| heard.row(row), External::default(), (*span, *exchanges), scale, &mut scratch);
         }
         // The reference has moved during the step: positions after the step are counted from its new place.
         let moved = |by: f64, column: usize| reference.map_or(0.0, |reference| by * z[(reference, column)]);
@@ -378,6 +380,7 @@ mod tests {
             (&["link.delay=13.7ms", two_kinds], true),
             (&["link.loss={ packets = [2], every = 5 }", two_kinds], true),
             (&["coordination.strategy=\"extrapolated\"", "link.delay=3ms"], false),
+            (&["peer.device.exchange-every=3", "peer.device.exchange-age=1"], true),
             (&["peers=[{ name = \"peer2\", clock = { offset = \"0.4ms\" } }, { name = \"peer3\", tick = \"2ms\" }]"], true),
         ] {
             let overrides: Vec<String> = set.iter().map(|text| (*text).to_owned()).collect();

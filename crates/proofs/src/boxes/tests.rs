@@ -64,6 +64,7 @@ fn every_number_is_judged_as_single_scenes_are() {
         &["coordination.strategy=\"extrapolated\"", "object.split-mass=false", "link.delay=3ms"],
         &["object.damping=2", "peer.device.damping=1"],
         &["peer.compute-delay=1"],
+        &["peer.device.exchange-every=3", "peer.device.exchange-age=1", "peer.coupling.stiffness=900"],
         &["link.loss={ packets = [2, 3], every = 20 }", "object.split-mass=false"],
         &["scene.count=3", "peers=[{ name = \"peer1\", contact = \"none\" }]"],
         &["scene.count=4", "peers=[{ name = \"peer1\", device = { mass = 0.2 } }, { name = \"peer2\", device = { mass = 0.2 } }]", PD],
@@ -374,6 +375,10 @@ fn no_box_holds_a_point_that_contradicts_it() {
         (&["scene.count=3"][..], GAINS),
         (&["scene.count=5", "link.delay=20ms", PD], ["coordination.stiffness=100..2000", "coordination.damping=0..5"]),
         (&["scene.count=4", "link.delay=5ms", "peer.compute-delay=1"], ["coordination.stiffness=0..6000", "peer.coupling.stiffness=0..6000"]),
+        (
+            &["scene.count=3", "peer.device.exchange-every=2", "peer.device.exchange-age=1"],
+            ["coordination.stiffness=100..3000", "peer.coupling.stiffness=100..6000"],
+        ),
         (&["scene.count=8", PD], ["object.mass=0.1..2", "object.damping=0..10"]),
         (&["scene.count=3"], ["peer.device.mass=0.02..0.5", "peer.coupling.damping=0..20"]),
         (
@@ -480,6 +485,8 @@ fn the_product_of_the_steps_is_the_frame() {
         &["link.delay=24ms"],
         &["link.delay=3ms", "coordination.update=5ms"],
         &["peer.compute-delay=1"],
+        &["peer.device.exchange-every=3", "peer.device.exchange-age=1"],
+        &["peer.device.exchange-every=4"],
         &["coordination.damping=0"],
         &["coordination.strategy=\"extrapolated\"", "link.delay=11ms"],
         &["coordination.strategy=\"extrapolated\"", "coordination.extrapolated.horizon=13ms", "link.delay=11ms"],

@@ -22,6 +22,7 @@ use cohaptic_scene::Scene;
 use cohaptic_stability::Matrix;
 use cohaptic_stability::frames::{
     Contacts, Event, LawRow, LinearLaw, Node, NodeClock, NominalNetwork, Scale, Structure, Timetable, UseOfHeld, has_equal_clocks,
+    refuse_slow_devices,
 };
 use cohaptic_stability::numerics::real;
 
@@ -56,6 +57,7 @@ impl Waves {
         if !Self::tie(scene) {
             return Ok(None);
         }
+        refuse_slow_devices(scene, "a proof of wave coordination")?;
         if scene.object.enclosure.is_some() {
             return Err(ProofError::WallLeftOut { strategy: scene.coordination.strategy.name() });
         }

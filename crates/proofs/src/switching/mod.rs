@@ -54,7 +54,7 @@ use std::time::Duration;
 
 use cohaptic_peer::{Contact as ContactKind, Gains};
 use cohaptic_scene::Scene;
-use cohaptic_stability::frames::{Node, NominalNetwork, Piece, Structure, check_laws, notes, pieces};
+use cohaptic_stability::frames::{Node, NominalNetwork, Piece, Structure, check_laws, notes, pieces, refuse_slow_devices};
 use cohaptic_stability::{AnalysisError, Watch, has_chance};
 use rayon::prelude::*;
 
@@ -118,6 +118,7 @@ pub fn prove_switching(scene: &Scene, watch: &dyn Watch) -> Result<Switching, Sw
     if has_chance(scene) {
         return Err(SwitchingError::Chance);
     }
+    refuse_slow_devices(scene, "the proof of contacts that switch")?;
     let pieces = pieces(scene, "the proof of contacts that switch")?;
     let network = NominalNetwork::of(scene)?;
     // A control law that the analysis does not know is refused first: this error says more than the error of a scene without contacts.

@@ -7,4 +7,5 @@ mod cases;
 #[path = "../../../stability/tests/integration/ends.rs"]
 mod ends;
 mod people;
+mod slow_devices;
 mod worst_case;

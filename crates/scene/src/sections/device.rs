@@ -6,8 +6,10 @@ use cohaptic_linkfile::document::{Node, Value, quote};
 use cohaptic_linkfile::reading::{Context, TableReader, values};
 use cohaptic_linkfile::schema::{Choices, Form, Table, number, optional, required, somewhere, usual, vector, words};
 use cohaptic_peer::rotation::Spin;
-use cohaptic_peer::{Contact, DeviceConfig, Direction, Drift, Gains};
+use cohaptic_peer::{Contact, DeviceConfig, Direction, Drift, Exchange, Gains};
+use cohaptic_units::print::Span;
 
+use super::MOST;
 use super::coordination::{SCALING, SCALINGS};
 use super::rotation::{read_coupling_rotation, read_device_rotation};
 use crate::context::{SceneContext, check_axis};
@@ -19,6 +21,15 @@ pub(super) static DEVICE: Table = Table::of(&[&[
     usual("damping", number(DAMPING), "0", "Viscous damping of the device"),
     optional("inertia", vector(INERTIA), "Moments of inertia of a device with six degrees of freedom"),
     usual("rotational-damping", vector(ROTATIONAL_DAMPING), "0", "Viscous rotational damping of the device"),
+    usual(
+        "exchange-every",
+        Form::Integer(1, MOST),
+        "1",
+        "Ticks from one exchange with the device to the next: a reading, and the force that the device then keeps",
+    )
+    .expecting("a number of ticks, an integer from 1, of at most 100 ms together"),
+    usual("exchange-age", Form::Integer(0, 1), "0", "Exchanges between a reading of the device and its use")
+        .expecting("a number of exchanges, 0 or 1"),
 ]]);
 pub(super) static COUPLING: Table = Table::of(&[&[
     somewhere("stiffness", number(STIFFNESS), "Stiffness between device and copy, K_C"),
@@ -73,13 +84,68 @@ fn read_direction(node: &Node, context: SceneContext<'_>) -> Option<Direction> {
     Some(direction)
 }
 
-/// Reads a device and its rotational part; `Some((_, None))` for a device that does not turn.
-pub(super) fn read_device(node: &Node, context: Context<'_>, expected: &str) -> Option<(DeviceConfig, Option<Spin>)> {
+/// Longest time between two exchanges with a device. A force that acts for longer is no coupling any more, and drivers of devices end such a force.
+const LONGEST_EXCHANGE: Duration = Duration::from_millis(100);
+
+/// A device as written.
+#[derive(Clone, Debug)]
+pub(super) struct DeviceRead {
+    pub(super) config: DeviceConfig,
+    pub(super) exchange: Exchange,
+    /// Rotational part; `None` for a device that does not turn.
+    pub(super) turned: Option<Spin>,
+}
+
+/// Parts of a peer on which the exchanges of its device depend.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ExchangeLimits {
+    /// Tick of the peer; `None` if the tick is not known yet.
+    pub(super) tick: Option<Duration>,
+    /// `true` if computed forces act a tick late.
+    pub(super) compute_delay: bool,
+    /// `true` if the object turns.
+    pub(super) turns: bool,
+}
+
+/// Reads a device.
+pub(super) fn read_device(node: &Node, context: Context<'_>, limits: ExchangeLimits, expected: &str) -> Option<DeviceRead> {
     let mut table = TableReader::new(node, context, &DEVICE, expected)?;
     let (mass, damping) = (table.value("mass"), table.value("damping"));
     let turned = read_device_rotation(&mut table);
+    let exchange = read_exchange(&mut table, context, limits);
     table.finish();
-    Some((DeviceConfig { mass: mass?, damping: damping? }, turned?))
+    Some(DeviceRead { config: DeviceConfig { mass: mass?, damping: damping? }, exchange: exchange?, turned: turned? })
+}
+
+/// Reads the exchanges with a device, within the limits of its peer.
+fn read_exchange(table: &mut TableReader<'_>, context: Context<'_>, limits: ExchangeLimits) -> Option<Exchange> {
+    let nodes = ["exchange-every", "exchange-age"].map(|key| table.get(key));
+    let (every, age): (Option<u64>, Option<u64>) = (table.value("exchange-every"), table.value("exchange-age"));
+    let exchange = Exchange { every: u32::try_from(every?).unwrap_or(u32::MAX), late: age? == 1 };
+    // The key that makes the device slow is the place of a fault.
+    let [of_every, of_age] = nodes;
+    let Some(node) = of_every.filter(|_| exchange.holds()).or_else(|| of_age.filter(|_| exchange.late)) else { return Some(exchange) };
+    if limits.compute_delay {
+        context.fault_at(
+            node,
+            "readings and forces of a slow device have their delays already: expected no compute-delay of 1, or an exchange at each tick",
+        );
+        return None;
+    }
+    if limits.turns {
+        context.fault_at(
+            node,
+            "an object that turns needs devices that exchange at each tick: expected no object.inertia, or exchange-every = 1 and exchange-age = 0",
+        );
+        return None;
+    }
+    if let Some(span) = limits.tick.and_then(|tick| tick.checked_mul(exchange.every)).filter(|span| *span > LONGEST_EXCHANGE) {
+        let message =
+            format!("{} ticks are {}: expected at most {} from one exchange to the next", exchange.every, Span(span), Span(LONGEST_EXCHANGE));
+        context.fault_at(node, message);
+        return None;
+    }
+    Some(exchange)
 }
 
 /// Reads a coupling: gains, the scaling of the gains, and rotational gains, or `None` for a coupling without rotational gains.

@@ -5,12 +5,12 @@ use core::time::Duration;
 use cohaptic_linkfile::document::Node;
 use cohaptic_linkfile::reading::TableReader;
 use cohaptic_linkfile::schema::{Form, Key, Table, optional, required, somewhere, usual, vector};
-use cohaptic_peer::{Clock, Contact, DeviceConfig, Gains, Hand};
+use cohaptic_peer::{Clock, Contact, DeviceConfig, Exchange, Gains, Hand};
 use cohaptic_units::print::Span;
 
 use super::MOST;
 use super::access::{ACCESS, Access, read_access};
-use super::device::{A_COUPLING, CLOCK, CONTACT, COUPLING, DEVICE, read_clock, read_contact, read_coupling, read_device};
+use super::device::{A_COUPLING, CLOCK, CONTACT, COUPLING, DEVICE, ExchangeLimits, read_clock, read_contact, read_coupling, read_device};
 use super::hand::{HAND, hand_is_sampled, read_hand, read_hand_torque};
 use super::kind::{FALCON, FALCON_DEVICE, KIND, POINTER, SILENCE, STILL_DEVICE, read_kind};
 use super::rotation::{PeerRotationKeys, QUATERNION, read_peer_rotation};
@@ -64,6 +64,7 @@ pub(crate) struct PeerKeys {
     pub(crate) compute_delay: bool,
     pub(crate) contact: Contact,
     pub(crate) device: DeviceConfig,
+    pub(crate) exchange: Exchange,
     pub(crate) coupling: Option<(Gains, Scaling)>,
     pub(crate) hand: Option<Hand>,
     pub(crate) position: Option<[f64; 3]>,
@@ -92,7 +93,10 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
     let phase_node = table.get("phase");
     let phase = table.value("phase");
     let contact = table.read("contact", |node, _| read_contact(node, context));
-    let device = table.maybe("device", |node, context| read_device(node, context, A_DEVICE));
+    // An entry may replace tick and compute-delay of `[peer]`, so that both are not known while `[peer]` is read alone.
+    let limits =
+        ExchangeLimits { tick: tick.filter(|_| !context.partial), compute_delay: compute_delay == Some(1) && !context.partial, turns: context.turns };
+    let device = table.maybe("device", |node, context| read_device(node, context, limits, A_DEVICE));
     // Device of a peer without a given device. A simulated peer needs a device, and so does another process in virtual time, where the peer is simulated.
     let absent = match &kind {
         None => None,
@@ -148,19 +152,16 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
     }
     let (offset, drift) = clock?;
     let (device, coupling) = (device?, coupling?);
-    let rotation = PeerRotationKeys {
-        device: device.and_then(|(_, turned)| turned),
-        coupling: coupling.and_then(|(_, _, turned)| turned),
-        torque: torque?,
-        ..turned?
-    };
+    let (exchange, turned_device) = device.as_ref().map_or((Exchange::EACH_TICK, None), |device| (device.exchange, device.turned));
+    let rotation = PeerRotationKeys { device: turned_device, coupling: coupling.and_then(|(_, _, turned)| turned), torque: torque?, ..turned? };
     Some(PeerKeys {
         kind: kind?,
         clock: Clock { tick: tick?, offset, drift },
         phase: phase?,
         compute_delay: compute_delay? == 1,
         contact: contact?,
-        device: device.map(|(device, _)| device).or(absent).unwrap_or(STILL_DEVICE),
+        device: device.map(|device| device.config).or(absent).unwrap_or(STILL_DEVICE),
+        exchange,
         coupling: coupling.map(|(gains, scaling, _)| (gains, scaling)),
         hand: hand?,
         position: position?,

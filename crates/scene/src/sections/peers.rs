@@ -158,6 +158,7 @@ fn spec(name: &str, index: usize, keys: PeerKeys, object: &ObjectSpec) -> PeerSp
         compute_delay: keys.compute_delay,
         contact: keys.contact,
         device: keys.device,
+        exchange: keys.exchange,
         coupling,
         coupling_scaling,
         hand,

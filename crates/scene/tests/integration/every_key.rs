@@ -3,7 +3,7 @@
 use core::time::Duration;
 use std::path::{Path, PathBuf};
 
-use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains, Hand, Integrator, Signal};
+use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Exchange, Gains, Hand, Integrator, Signal};
 use cohaptic_scene::{Axes, Bounds, ChangeKind, LinkSelector, Measure, MeasureName, MeasureSpec, MeasureTravel, Scaling, Scene};
 use cohaptic_units::{Bytes, Hertz, Instant, Probability, Rate};
 use cohaptic_wan::{
@@ -69,6 +69,7 @@ fn a_peer_is_its_own_keys_over_those_of_all_peers() {
     assert_eq!((right.clock.offset, right.clock.drift.parts_per_billion()), (300_000 * Duration::from_nanos(1), 10_000));
     assert_eq!((right.position, right.downlink.as_ref()), ([0.01, -0.02, 0.0], None));
     assert_eq!((third.contact, third.hand.as_ref(), third.phase, third.clock.tick), (Contact::None, None, 0, 2 * MILLISECOND));
+    assert_eq!((left.exchange, third.exchange), (Exchange::EACH_TICK, Exchange { every: 4, late: true }));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The admittance along one axis of a scene that does not turn, or on the one axis of an independent part of a turning object.
 
-use cohaptic_peer::{Contact, Gains};
+use cohaptic_peer::{Contact, Exchange, Gains};
 use cohaptic_scene::Scene;
 
 use super::harmonic::Harmonic;
@@ -70,10 +70,11 @@ impl OneAxis {
     fn leave_bare(&mut self, device: Option<Body>, clock: NodeClock, tied: bool) -> Result<(), AnalysisError> {
         let none = Gains { stiffness: 0.0, damping: 0.0 };
         let bare = self.nodes[self.pushed].clone();
-        self.nodes = vec![Node { device, coupling: none, law: LinearLaw::none(), wall: None, compute_delay: false, ..bare }];
+        self.nodes =
+            vec![Node { device, coupling: none, law: LinearLaw::none(), wall: None, compute_delay: false, exchange: Exchange::EACH_TICK, ..bare }];
         self.weights = Matrix::zeros(1, 1);
         // The device sends and receives no samples, so the frame is a single tick.
-        self.timetable = Timetable::new(&[NodeClock { phase: 0, every: 1, ..clock }], &[])?;
+        self.timetable = Timetable::new(&[NodeClock { phase: 0, every: 1, exchange: 1, ..clock }], &[])?;
         self.tied = tied;
         self.pushed = 0;
         Ok(())

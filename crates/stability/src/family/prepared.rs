@@ -108,7 +108,8 @@ impl Prepared {
                 | AnalysisError::OtherStrategy { .. }
                 | AnalysisError::Turns { .. }
                 | AnalysisError::Topology { .. }
-                | AnalysisError::Operator { .. },
+                | AnalysisError::Operator { .. }
+                | AnalysisError::SlowDevice { .. },
             ) => Ok(Cell { radius: self.radius::<BOUND>(scene, scratch).over(2), is_nominal: true }),
             Err(error) => Err(error),
         }

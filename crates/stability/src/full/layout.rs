@@ -1,7 +1,7 @@
 //! The layout of all peers' states in a vector: device, copy, pending forces, memory and person of each peer, then the samples of earlier frames.
 
 use cohaptic_peer::wire::SampleKind;
-use cohaptic_peer::{Peer, SimulatedDevice, Strategy};
+use cohaptic_peer::{Exchange, Peer, SimulatedDevice, Strategy};
 use cohaptic_scene::Scene;
 
 use super::person::Person;
@@ -23,6 +23,8 @@ pub(super) struct Layout {
     pub(super) people: Vec<usize>,
     /// `true` if each peer has computed forces that wait to be applied, as with a compute delay.
     pub(super) pending: Vec<bool>,
+    /// Exchanges with the device of each peer; at each tick for a device that touches nothing.
+    pub(super) exchange: Vec<Exchange>,
     /// Index of the newest sample of earlier frames of each peer; older samples follow.
     pub(super) samples: Vec<usize>,
     /// Number of receivers for which a sample carries extra numbers.
@@ -53,6 +55,7 @@ impl Layout {
             memory: Vec::new(),
             people: people.iter().map(|person| person.as_ref().map_or(0, Person::states)).collect(),
             pending: Vec::new(),
+            exchange: Vec::new(),
             samples: Vec::new(),
             receivers: if members.iter().any(|member| member.kind().is_personal()) { members.len() - 1 } else { 0 },
             has_waves: members.iter().any(|member| member.kind() == SampleKind::Wave),
@@ -65,11 +68,12 @@ impl Layout {
             let (pending, memory) = (scene.peers[place].compute_delay, member.strategy().memory().len());
             layout.first.push(layout.size);
             layout.pending.push(pending);
+            layout.exchange.push(if contacts.touching[place] { scene.peers[place].exchange } else { Exchange::EACH_TICK });
             layout.memory.push(memory);
             if !contacts.touching[place] && scene.device_plant(place).stiffness == 0.0 {
                 layout.loose.extend((0..A).map(|axis| layout.size + axis));
             }
-            layout.size += 4 * A + if pending { 2 * A } else { 0 } + memory;
+            layout.size += layout.before_memory::<A>(place) + memory;
             if people[place].as_ref().is_some_and(Person::is_limp) {
                 layout.unfelt.extend((0..A).map(|axis| layout.size + axis));
             }
@@ -82,9 +86,26 @@ impl Layout {
         layout
     }
 
+    /// Returns the number of states of a peer before the memory of its strategy: of its bodies, of pending forces, and of the exchanges with its device.
+    fn before_memory<const A: usize>(&self, place: usize) -> usize {
+        let Exchange { late, .. } = self.exchange[place];
+        let exchange = if late { 2 * A } else { 0 } + if self.exchange[place].holds() { 3 * A } else { 0 };
+        4 * A + if self.pending[place] { 2 * A } else { 0 } + exchange
+    }
+
+    /// Returns the indices of states that hold a position of the device of a peer along an axis.
+    pub(super) fn positions_of_device<const A: usize>(&self, place: usize, axis: usize) -> impl Iterator<Item = usize> {
+        let first = self.first[place];
+        let next = first + 4 * A + if self.pending[place] { 2 * A } else { 0 };
+        let exchange = self.exchange[place];
+        let latest = exchange.late.then_some(next);
+        let reading = exchange.holds().then_some(next + if exchange.late { 2 * A } else { 0 });
+        std::iter::once(first).chain(latest).chain(reading).map(move |first| first + axis)
+    }
+
     /// Returns the range of states that hold the memory of a peer's strategy.
     pub(super) fn memory_of<const A: usize>(&self, place: usize) -> std::ops::Range<usize> {
-        let first = self.first[place] + 4 * A + if self.pending[place] { 2 * A } else { 0 };
+        let first = self.first[place] + self.before_memory::<A>(place);
         first..first + self.memory[place]
     }
 
@@ -107,6 +128,13 @@ impl Layout {
             ];
             let count = if self.pending[peer] { 6 } else { 4 };
             names.extend(kinds.iter().take(count).flat_map(|kind| (0..A).map(move |axis| StateName { peer, kind: kind(axis) })));
+            let exchange = self.exchange[peer];
+            let latest: [fn(usize) -> StateKind; 2] = [|axis| StateKind::LatestPosition { axis }, |axis| StateKind::LatestVelocity { axis }];
+            let kept: [fn(usize) -> StateKind; 3] =
+                [|axis| StateKind::ReadingPosition { axis }, |axis| StateKind::ReadingVelocity { axis }, |axis| StateKind::KeptCoupling { axis }];
+            let latest = latest.iter().filter(|_| exchange.late);
+            let kinds = latest.chain(kept.iter().filter(|_| exchange.holds()));
+            names.extend(kinds.flat_map(|kind| (0..A).map(move |axis| StateName { peer, kind: kind(axis) })));
             names.extend((0..self.memory[peer]).map(|number| StateName { peer, kind: StateKind::Memory { number } }));
             let places = (0..self.people[peer] / A).flat_map(|age| (0..A).map(move |axis| (axis, age)));
             let kind = |axis, age| if age == 0 { StateKind::WantedPosition { axis } } else { StateKind::SeenPosition { axis, age } };

@@ -53,7 +53,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         for place in peers.iter().copied() {
             let first = self.layout.first[place];
             if self.layout.touching[place] {
-                moved[first + axis] = 1.0;
+                self.layout.positions_of_device::<A>(place, axis).for_each(|position| moved[position] = 1.0);
             }
             moved[first + 2 * A + axis] = 1.0;
             // The samples of a client are positions of its device, which moves only if the client touches the object.

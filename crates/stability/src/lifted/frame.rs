@@ -169,7 +169,7 @@ impl Lifted<'_> {
                     held[to * nodes + from] = row_of(from, sample).map(|row| (row, sample));
                     stale[to] = true;
                 }
-                Event::Tick { node, at, span } => {
+                Event::Tick { node, at, span, exchanges } => {
                     // The sums change only after a delivery, unless the laws use the ages of samples: ages change from tick to tick.
                     if std::mem::take(&mut stale[node]) || instants.is_some() {
                         (0..law_rows).for_each(|row| heard.row_mut(node * law_rows + row).fill(0.0));
@@ -207,7 +207,7 @@ impl Lifted<'_> {
                     let [touches, stands] = instrument.touch(node, &z, rows[node], [&mut coupling[inputs..], &mut wall[inputs..]]);
                     let external = External { hand, coupling: touches.then_some(coupling.as_slice()), wall: stands.then_some(wall.as_slice()) };
                     let heard = |row: usize| heard.row(node * law_rows + row);
-                    self.nodes[node].tick(&mut z, rows[node], heard, external, span, scale, &mut scratch);
+                    self.nodes[node].tick(&mut z, rows[node], heard, external, (span, exchanges), scale, &mut scratch);
                     rounding.tick(norm(&z, rows[node], self.nodes[node].states()));
                 }
             }

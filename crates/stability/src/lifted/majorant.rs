@@ -13,6 +13,8 @@
 
 use std::collections::VecDeque;
 
+use cohaptic_peer::Exchange;
+
 use super::node::{Body, Node, Scale};
 use super::operator::Seen;
 use super::system::Lifted;
@@ -53,6 +55,11 @@ struct NodeSizes {
     copy: [Size; 2],
     /// Sizes of the forces at the next tick, on the copy and on the device \[N\].
     pending: [Size; 2],
+    /// Sizes of the device at the latest exchange, and of the reading that the coupling uses.
+    latest: [Size; 2],
+    reading: [Size; 2],
+    /// Size of the force that the device keeps \[N\].
+    kept: Size,
     /// Sizes of the numbers of the law's memory, in the law's own units.
     memory: Vec<Size>,
     /// Sizes of the used combinations of the own states of the latest ticks, the newest first.
@@ -83,6 +90,9 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
             device: [Size::UNIT; 2],
             copy: [Size::UNIT; 2],
             pending: [force; 2],
+            latest: [Size::UNIT; 2],
+            reading: [Size::UNIT; 2],
+            kept: force,
             memory,
             past: vec![Size::UNIT; lifted.nodes[node].looks_back()].into(),
             wanted: Size::UNIT,
@@ -125,7 +135,7 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
             }
             // A held sample keeps its size until the next delivery. Its coefficients do not change in between.
             Event::Deliver { from, to, sample } => held[to * nodes + from] = Some(of_sample(&sent, from, sample)),
-            Event::Tick { node, span, .. } => {
+            Event::Tick { node, span, exchanges, .. } => {
                 let mut heard = vec![Size::ZERO; 1 + lifted.nodes[node].law.memory.len()];
                 for from in 0..nodes {
                     for (channel, number) in held[node * nodes + from].iter().flatten().enumerate() {
@@ -142,7 +152,7 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
                     Some(Seen::Held { from }) => held[node * nodes + from].as_ref().map_or(Size::ZERO, |sample| sample[0]),
                     Some(Seen::Nothing) | None => Size::ZERO,
                 };
-                tick(&lifted.nodes[node], &mut sizes[node], &heard, sees, lifted, span);
+                tick(&lifted.nodes[node], &mut sizes[node], &heard, sees, lifted, (span, exchanges));
             }
         }
     }
@@ -162,6 +172,16 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
         if lifted.nodes[node].compute_delay {
             size.pending.iter().for_each(|force| add(Size::ZERO.plus(compliance(node), *force).rounded(f64::EPSILON), Size::ZERO));
         }
+        let exchange = lifted.nodes[node].exchanges();
+        for [position, velocity] in
+            [(exchange.late, size.latest), (exchange.holds(), size.reading)].into_iter().filter_map(|(is, size)| is.then_some(size))
+        {
+            add(position, origin);
+            add(velocity, Size::ZERO);
+        }
+        if exchange.holds() {
+            add(Size::ZERO.plus(compliance(node), size.kept).rounded(f64::EPSILON), Size::ZERO);
+        }
         // The reference counts in each number by the share of the position, a share of at most 1.
         size.past.iter().for_each(|number| add(*number, origin));
         if lifted.nodes[node].operator.is_some() {
@@ -176,7 +196,7 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
 }
 
 /// Makes one tick of a node in sizes: see [`Node::tick`]. `sees` is the size of the place that the operator of the node sees.
-fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], sees: Size, lifted: &Lifted<'_>, span: std::time::Duration) {
+fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], sees: Size, lifted: &Lifted<'_>, (span, exchanges): (std::time::Duration, bool)) {
     let time = lifted.time;
     let (wall, gains) = (node.wall.unwrap_or(cohaptic_peer::Gains { stiffness: 0.0, damping: 0.0 }), node.law.force.own);
     let [x, v] = sizes.copy;
@@ -196,7 +216,7 @@ fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], sees: Size, lifted: 
     // Every term of a force counts with its absolute value: signs must not cancel in a bound.
     let mut on_device = Size::ZERO;
     if node.device.is_some() {
-        let [xh, vh] = sizes.device;
+        let [xh, vh] = read(node, sizes, exchanges);
         let (stiffness, damping) = (node.coupling.stiffness, node.coupling.damping / time);
         on_device = Size::ZERO.plus(stiffness, xh).plus(stiffness, x).plus(damping, vh).plus(damping, v);
         on_copy = on_copy.plus(1.0, on_device);
@@ -216,11 +236,31 @@ fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], sees: Size, lifted: 
         let computed = [on_copy.rounded(TICK), on_device.rounded(TICK)];
         [on_copy, on_device] = std::mem::replace(&mut sizes.pending, computed);
     }
+    if node.exchanges().holds() {
+        // Stored as a length and read as a force, so that each of both rounds.
+        if exchanges {
+            sizes.kept = on_device.rounded(TICK);
+        }
+        on_device = sizes.kept;
+    }
     advance(&node.object, &mut sizes.copy, on_copy, time, span);
     if let Some(device) = &node.device {
         // The force of the hand acts at its own tick, also where computed forces wait.
         advance(device, &mut sizes.device, on_device.plus(1.0, of_hand), time, span);
     }
+}
+
+/// Reads the device as a tick of a node with or without an exchange does, and returns the sizes that the coupling uses.
+fn read(node: &Node, sizes: &mut NodeSizes, exchanges: bool) -> [Size; 2] {
+    let exchange = node.exchanges();
+    if exchange == Exchange::EACH_TICK {
+        return sizes.device;
+    }
+    if exchanges {
+        sizes.reading = if exchange.late { sizes.latest } else { sizes.device };
+        sizes.latest = sizes.device;
+    }
+    sizes.reading
 }
 
 // A step map adds e·z and g·F to the state. The terms count with absolute values, and the exact maps round `factor` times as much.

@@ -5,7 +5,7 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::{Clock, Gains, Integrator, Motion, Plant, StepMap, tick};
+use cohaptic_peer::{Clock, Exchange, Gains, Integrator, Motion, Plant, StepMap, tick};
 
 use super::operator::Seen;
 use super::{Operator, Sampling};
@@ -105,6 +105,8 @@ pub struct Node {
     pub wall: Option<Gains>,
     /// `true` if forces act one tick after their computation.
     pub compute_delay: bool,
+    /// Ticks at which the node reads its device and gives the device a new force. Without a meaning if the node has no device.
+    pub exchange: Exchange,
     /// `true` if position and velocity of the own past are both states. Otherwise only the combination used by the law is a state.
     pub keeps_whole_past: bool,
 }
@@ -118,12 +120,54 @@ pub struct Rows {
     pub object: usize,
     /// Row of the force on the copy at the next tick, if forces act one tick late; the row of the force of the device's coupling follows.
     pub(crate) pending: Option<usize>,
+    /// Rows of what a slow device and its copy know of each other, if the node has such a device.
+    pub(crate) exchange: ExchangeRows,
     /// Row of the wanted place of the operator's arm, if it is a state.
     pub(crate) wanted: Option<usize>,
     /// Row of the first number of the law's memory; the rest of the memory follows.
     pub(crate) memory: usize,
     /// First row of the own states of the latest ticks, the newest first, if the law looks back: one combination per tick, or position and velocity.
     pub(crate) past: usize,
+}
+
+/// Rows of the readings and of the force between two exchanges with a device.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(crate) struct ExchangeRows {
+    /// Row of the position of the device at the latest exchange, if readings are late; the row of the velocity follows.
+    pub(crate) latest: Option<usize>,
+    /// Row of the position of the reading that the coupling uses, if an exchange is not at each tick; the row of the velocity follows, then the row of the
+    /// force that the device keeps.
+    pub(crate) reading: Option<usize>,
+}
+
+impl ExchangeRows {
+    /// Returns the rows from `first` on.
+    fn of(exchange: Exchange, first: usize) -> Self {
+        let latest = exchange.late.then_some(first);
+        Self { latest, reading: exchange.holds().then_some(first + if exchange.late { 2 } else { 0 }) }
+    }
+
+    /// Reads the device with the row `device` at a tick, and returns the row of the position that the coupling uses.
+    fn read(self, z: &mut Matrix, device: usize, exchanges: bool) -> usize {
+        let source = self.latest.unwrap_or(device);
+        let Some(reading) = self.reading else { return source };
+        if exchanges {
+            z.move_rows(source..source + 2, reading);
+        }
+        reading
+    }
+
+    /// Notes the device for the next exchange, if readings are late. After the forces of the tick, because the reading that they use may stand in the row.
+    fn note(self, z: &mut Matrix, device: usize, exchanges: bool) {
+        if let Some(latest) = self.latest.filter(|_| exchanges) {
+            z.move_rows(device..device + 2, latest);
+        }
+    }
+
+    /// Returns the number of rows.
+    fn count(exchange: Exchange) -> usize {
+        usize::from(exchange.late) * 2 + usize::from(exchange.holds()) * 3
+    }
 }
 
 /// The units of the states.
@@ -173,7 +217,13 @@ impl Node {
     /// Returns the number of rows of the node's states.
     pub fn states(&self) -> usize {
         let bodies = if self.device.is_some() { 2 } else { 1 };
-        2 * bodies + if self.compute_delay { bodies } else { 0 } + usize::from(self.has_wanted()) + self.law.memory.len() + self.past_rows()
+        let waiting = if self.compute_delay { bodies } else { 0 } + ExchangeRows::count(self.exchanges());
+        2 * bodies + waiting + usize::from(self.has_wanted()) + self.law.memory.len() + self.past_rows()
+    }
+
+    /// Returns the exchanges with the device; at each tick for a node without a device.
+    pub(crate) fn exchanges(&self) -> Exchange {
+        if self.device.is_some() { self.exchange } else { Exchange::EACH_TICK }
     }
 
     /// Tells whether the wanted place of an operator's arm is a state of the node.
@@ -200,7 +250,7 @@ impl Node {
 
     /// Returns the distance by which a translation of everything by 1 moves the row `row` of the node with the rows `rows`.
     pub fn displacement(&self, rows: Rows, row: usize, time: f64) -> f64 {
-        if row == rows.object || Some(row) == rows.device {
+        if row == rows.object || [rows.device, rows.exchange.latest, rows.exchange.reading].contains(&Some(row)) {
             1.0
         } else if row >= rows.past && self.keeps_whole_past {
             if (row - rows.past).is_multiple_of(2) { 1.0 } else { 0.0 }
@@ -218,7 +268,9 @@ impl Node {
         let past = first + self.states() - self.past_rows();
         let memory = past - self.law.memory.len();
         let wanted = self.has_wanted().then(|| memory - 1);
-        Rows { device, object, pending: self.compute_delay.then_some(object + 2), wanted, memory, past }
+        let pending = self.compute_delay.then_some(object + 2);
+        let exchange = ExchangeRows::of(self.exchanges(), memory - usize::from(wanted.is_some()) - ExchangeRows::count(self.exchanges()));
+        Rows { device, object, pending, exchange, wanted, memory, past }
     }
 
     /// Returns the compliance by which the node's forces become lengths: the motion of the copy by a unit force within the common time [m/N].
@@ -253,11 +305,14 @@ impl Node {
             factor * position.max(velocity)
         };
         let hand = self.operator.map_or(0.0, |operator| operator.force_norm());
-        let device = self.device.as_ref().map_or(0.0, |body| row(body, 2.0 * gain(self.coupling) + hand));
+        // A force that the device keeps is a length by the compliance.
+        let kept = if self.exchanges().holds() { 1.0 / scale.compliance } else { 0.0 };
+        let device = self.device.as_ref().map_or(0.0, |body| row(body, (2.0 * gain(self.coupling)).max(kept) + hand));
+        let taken = if kept > 0.0 { 2.0 * gain(self.coupling) * scale.compliance } else { 0.0 };
         let wanted = self.operator.map_or(0.0, |operator| 1.0 + operator.tick * operator.crossover.abs());
         let memory = |(place, row): (usize, &LawRow)| (seen(row) + remembered(row)) * self.memory_unit(place, scale);
         let memory = self.law.memory.iter().enumerate().map(memory).fold(0.0, f64::max);
-        row(&self.object, on_object).max(device).max(wanted).max(memory)
+        row(&self.object, on_object).max(device).max(taken).max(wanted).max(memory)
     }
 
     /// Returns the factor by which number `place` of the law's memory becomes a length: the motion of the copy by the force of one unit of the number within
@@ -270,8 +325,8 @@ impl Node {
     }
 
     /// Makes one tick: computes the forces from the rows `z` and moves device and copy by `span`. `heard` returns the force on each row of the law from
-    /// the held samples \[N\], the row of FT first. `external` has the forces from outside the states. Every row is a linear function of the same
-    /// unknowns, one column each.
+    /// the held samples \[N\], the row of FT first. `external` has the forces from outside the states. `exchanges` tells whether the node exchanges with its
+    /// device at this tick. Every row is a linear function of the same unknowns, one column each.
     #[expect(clippy::too_many_arguments, reason = "what a tick needs, each of its own kind")]
     pub fn tick<'a>(
         &self,
@@ -279,7 +334,7 @@ impl Node {
         rows: Rows,
         heard: impl Fn(usize) -> &'a [f64],
         external: External<'_>,
-        span: Duration,
+        (span, exchanges): (Duration, bool),
         scale: Scale,
         scratch: &mut Scratch,
     ) {
@@ -295,19 +350,22 @@ impl Node {
                 let copy = Motion { position: x[column], velocity: v[column] };
                 on_object[column] = tick::on_object(0.0, tick::coordinate(&own, copy) - target[column]);
             }
-            if let Some(device) = rows.device {
-                let (xh, vh) = (z.row(device), z.row(device + 1));
-                let gains = scale.gains(self.coupling);
-                for column in 0..columns {
-                    let copy = Motion { position: x[column], velocity: v[column] };
-                    let grasp = || tick::grasp(&gains, Motion { position: xh[column], velocity: vh[column] }.relative_to(copy));
-                    coupling[column] = external.coupling.map_or_else(grasp, |force| force[column]);
-                    on_object[column] += coupling[column];
-                }
+        }
+        if let Some(device) = rows.device {
+            let reading = rows.exchange.read(z, device, exchanges);
+            let (x, v) = (z.row(rows.object), z.row(rows.object + 1));
+            let (xh, vh) = (z.row(reading), z.row(reading + 1));
+            let gains = scale.gains(self.coupling);
+            for column in 0..columns {
+                let copy = Motion { position: x[column], velocity: v[column] };
+                let grasp = || tick::grasp(&gains, Motion { position: xh[column], velocity: vh[column] }.relative_to(copy));
+                coupling[column] = external.coupling.map_or_else(grasp, |force| force[column]);
+                on_object[column] += coupling[column];
             }
-            for (force, wall) in on_object.iter_mut().zip(external.wall.unwrap_or_default()) {
-                *force += wall;
-            }
+            rows.exchange.note(z, device, exchanges);
+        }
+        for (force, wall) in on_object.iter_mut().zip(external.wall.unwrap_or_default()) {
+            *force += wall;
         }
         // Past states and memory change here, before the copy moves, because both take in the state used by the forces of this tick.
         if self.looks_back() > 0 {
@@ -323,6 +381,9 @@ impl Node {
                 // The device gets the same coupling force as the copy, with the opposite sign, and moves after the force on the copy is known.
                 exchange(z.row_mut(pending + 1), coupling, scale.compliance);
             }
+        }
+        if let Some(reading) = rows.exchange.reading {
+            keep(z.row_mut(reading + 2), coupling, scale.compliance, exchanges);
         }
         advance(z, rows.object, &self.object.scaled_map(span, scale.time), on_object);
         if let (Some(first), Some(device)) = (rows.device, &self.device) {
@@ -438,6 +499,17 @@ fn exchange(stored: &mut [f64], force: &mut [f64], compliance: f64) {
         let before = *stored / compliance;
         *stored = *force * compliance;
         *force = before;
+    }
+}
+
+/// Stores the forces as lengths at an exchange. At other ticks replaces the forces by the forces of the latest exchange \[N\].
+fn keep(kept: &mut [f64], force: &mut [f64], compliance: f64, exchanges: bool) {
+    for (kept, force) in kept.iter_mut().zip(force) {
+        if exchanges {
+            *kept = *force * compliance;
+        } else {
+            *force = *kept / compliance;
+        }
     }
 }
 

@@ -135,7 +135,7 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
                     made.steps.push(Step::Deliver { link, row: held_row(link), numbers, outcomes });
                 }
             }
-            Event::Tick { node, span, .. } => {
+            Event::Tick { node, span, exchanges, .. } => {
                 // Arrivals come before the tick of the same instant, as in the simulator: the tick already uses the sample that arrived at the tick.
                 for (link, line) in lines.iter().enumerate().filter(|(_, line)| line.to == node) {
                     for outcomes in outcomes(line, tick[node], &instants.sends[line.from], frame) {
@@ -150,7 +150,7 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
                 tick[node] += 1;
                 let states = lifted.nodes[node].states();
                 let map = pending[node].get_or_insert_with(|| Tracked::new(states, states, numbers));
-                map.tick(&lifted.nodes[node], lifted, span, scale);
+                map.tick(&lifted.nodes[node], lifted, (span, exchanges), scale);
                 if node + 1 == nodes && !extrapolated.is_empty() {
                     // The nodes have equal clocks if the law extrapolates, so the tick of the last node ends the instant, and all samples age by `span`.
                     (0..nodes).for_each(|node| flush(&mut pending, &mut made, node));

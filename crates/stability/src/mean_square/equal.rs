@@ -177,7 +177,7 @@ impl Equal {
                     sample += 1;
                 }
                 Event::Deliver { .. } => {}
-                Event::Tick { span, .. } => {
+                Event::Tick { span, exchanges, .. } => {
                     // Deliveries of a tick come before the motion of the tick, so that the force already uses the new sample.
                     while let Some(delivery) = self.deliveries.get(next).filter(|delivery| delivery.tick == tick) {
                         let place = i64::try_from(states + depth).ok()? + delivery.sample;
@@ -203,7 +203,7 @@ impl Equal {
                             *heard = by * (weight * rows[(mean, column)] + rows[(noise, column)]);
                         }
                     }
-                    node.tick(rows, own, |row| heard.row(row), External::default(), span, scale, scratch);
+                    node.tick(rows, own, |row| heard.row(row), External::default(), (span, exchanges), scale, scratch);
                     tick += 1;
                 }
             }

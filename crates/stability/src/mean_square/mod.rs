@@ -45,7 +45,7 @@ use crate::cost::{FrameCost, PASSES};
 use crate::lifted::{Lifted, Node};
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::parts::{PartKind, radius_of, reduced};
-use crate::pieces::{refuse_operators, refuse_topology, split};
+use crate::pieces::{refuse_operators, refuse_slow_devices, refuse_topology, split};
 use crate::rounding::real;
 use crate::structure::{Contacts, Structure, has_equal_clocks, linear_law};
 use crate::timetable::{Instants, NodeClock, Timetable};
@@ -134,6 +134,7 @@ pub fn mean_square_watched(scene: &Scene, limits: &Limits<'_>) -> Result<MeanSqu
     let limits = &Limits { unknowns: limits.unknowns.min(MOST_UNKNOWNS), ..*limits };
     refuse_topology(scene, "the mean square")?;
     refuse_operators(scene, "the mean square")?;
+    refuse_slow_devices(scene, "the mean square")?;
     let pieces = split(scene).map_err(|why| AnalysisError::Turns { what: "the mean square", why })?;
     let network = NominalNetwork::of(scene)?;
     let mut notes = Vec::new();
@@ -403,6 +404,7 @@ impl Followed {
             return Ok(Self::Certain);
         }
         refuse_operators(scene, "the mean square")?;
+        refuse_slow_devices(scene, "the mean square")?;
         Ok(Independent::of(scene, network, structure)?.map_or(Self::Anew, |Independent { timetable, hazards, held }| Self::Equal {
             frame: Equal::new(scene.peers.len(), timetable, &hazards),
             held: held.value,

@@ -109,7 +109,7 @@ impl Symmetric {
                     sample += 1;
                 }
                 Event::Deliver { .. } => {}
-                Event::Tick { span, .. } => {
+                Event::Tick { span, exchanges, .. } => {
                     // A delivery changes the held samples and is random, so the deterministic ticks before must be complete as one map.
                     if !hazards.at[tick].is_empty() {
                         steps.push(flush(&map, &|row| row, full));
@@ -119,7 +119,7 @@ impl Symmetric {
                             steps.push(Step::Deliver { state: usize::try_from(place).unwrap_or(0), probability: hazard.hazard });
                         }
                     }
-                    map.tick(node, lifted, span, scale);
+                    map.tick(node, lifted, (span, exchanges), scale);
                     tick += 1;
                 }
             }

@@ -44,7 +44,7 @@ impl Tracked {
     }
 
     /// Applies a tick of the node whose states are the first rows. The node's held samples must already be extrapolated to the instant of the tick.
-    pub(crate) fn tick(&mut self, node: &Node, lifted: &Lifted<'_>, span: Duration, scale: Scale) {
+    pub(crate) fn tick(&mut self, node: &Node, lifted: &Lifted<'_>, of_tick: (Duration, bool), scale: Scale) {
         let states = node.states();
         let held = self.held;
         let heard: Vec<Vec<f64>> = (0..held).map(|number| node.heard(lifted.sampling, number, 0.0, lifted.time).collect()).collect();
@@ -54,7 +54,7 @@ impl Tracked {
             let columns = matrix.columns() - held;
             let of = |row: usize, column: usize| column.checked_sub(columns).map_or(0.0, |number| heard[number][row]);
             let heard = Matrix::from_fn(1 + node.law.memory.len(), columns + held, of);
-            node.tick(matrix, node.rows(0), |row| heard.row(row), External::default(), span, scale, &mut scratch);
+            node.tick(matrix, node.rows(0), |row| heard.row(row), External::default(), of_tick, scale, &mut scratch);
         };
         // The matrix T of this tick alone. Its terms must be computed before `value` changes, because they need P from before the tick.
         let mut single = Self::new(states, states, held).value;

@@ -170,7 +170,7 @@ impl Turning<'_> {
             match *event {
                 Event::Sample { node } => samples[node].push(peers[node].copy),
                 Event::Deliver { from, to, sample } => held[to * nodes + from] = Some(sample),
-                Event::Tick { node: to, at, span } => {
+                Event::Tick { node: to, at, span, .. } => {
                     // The force of a sample is linear in the sample, so weighted sums over the senders are added component by component.
                     let node = &self.nodes[to];
                     let mut drawn = [0.0; 6];

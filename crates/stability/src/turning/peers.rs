@@ -70,7 +70,7 @@ impl Bases {
                     samples[node].push(sample);
                 }
                 Event::Deliver { from, to, sample } => hold(members, &samples, (to, from, sample)),
-                Event::Tick { node, at, span } => {
+                Event::Tick { node, at, span, .. } => {
                     members[node].compute(Instant::from_nanos(at));
                     members[node].advance(Instant::from_nanos(at), span);
                 }

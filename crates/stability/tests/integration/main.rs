@@ -10,6 +10,7 @@ mod cases;
 mod client_server;
 mod crossover;
 mod ends;
+mod exchange;
 mod graphs;
 mod laws;
 mod mean_square;

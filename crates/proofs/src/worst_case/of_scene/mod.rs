@@ -59,7 +59,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::frames::{notes, pairs, pieces};
+use cohaptic_stability::frames::{notes, pairs, pieces, refuse_slow_devices};
 use cohaptic_stability::{Unwatched, Watch};
 use rayon::prelude::*;
 
@@ -166,6 +166,7 @@ pub fn worst_case(scene: &Scene, patterns: &Patterns, effort: &Effort) -> Result
 ///
 /// As for [`worst_case`], and [`AnalysisError::Stopped`](cohaptic_stability::AnalysisError::Stopped) if the watch ends the search.
 pub fn worst_case_watched(scene: &Scene, patterns: &Patterns, effort: &Effort, watch: &dyn Watch) -> Result<SceneWorstCase, SceneWorstCaseError> {
+    refuse_slow_devices(scene, "the worst case")?;
     let pieces = pieces(scene, "the worst case")?;
     let network = patterns.network(scene)?;
     let mut combines = false;

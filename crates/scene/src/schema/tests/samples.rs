@@ -21,7 +21,7 @@ pub(super) const SCENES: [&str; 5] = [
         { name = "a", hand = { sine = { amplitude = 1, frequency = 1 } }, clock = { offset = "1ms" }, contact = { push = "+x" } },
         { name = "b", hand = { arm = { mass = 0, damping = 1, stiffness = 1 }, follows = { sine = { amplitude = 1, frequency = 1 } } }, clock = { drift = "1ppm" } },
         { name = "c", hand = { arm = { mass = 0, damping = 1, stiffness = 1 }, follows = { position = 1 } }, uplink = { delay = "1ms" }, downlink = { loss = 0.1 } },
-        { name = "d", kind = "simulated", hand = { operator = { arm = { mass = 0.4 }, sees = "a" } } },
+        { name = "d", kind = "simulated", device = { exchange-every = 4, exchange-age = 1 }, hand = { operator = { arm = { mass = 0.4 }, sees = "a" } } },
     ]
     modulators = [{ name = "cell", states = [
         { name = "good", sojourn = { fixed = "1s" }, next = { bad = 1 } },
