@@ -55,6 +55,7 @@ shipped![
     "coordination/send-when",
     "coordination/set-position-throw",
     "coordination/set-position",
+    "coordination/slow-device",
     "coordination/smoothed-average-position",
     "coordination/topology-relay",
     "coordination/topology-ring",
