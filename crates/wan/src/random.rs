@@ -46,6 +46,8 @@ pub enum Purpose {
     TargetOrder,
     /// Noise of a movement of an operator, in a stream of its own. The n-th movement has the draws of packet n; its axes are copies.
     Movement,
+    /// Orders, seeds and persons of a study, and flipped signs of its statistics, each in a stream of its own.
+    Study,
     /// Process of an impairment of [the list](crate::Impairments), by its code. The n-th event has the draws of packet n.
     Listed(u8),
 }
@@ -68,6 +70,7 @@ impl Purpose {
             Self::Slot => 12,
             Self::TargetOrder => 18,
             Self::Movement => 20,
+            Self::Study => 22,
             Self::Listed(code) => code as u64,
         }
     }
@@ -302,7 +305,7 @@ mod tests {
     fn no_two_draws_share_an_address() {
         use Purpose::{
             Corruption, CrossTraffic, Duplication, InitialState, Jitter, Listed, Loss, Modulation, Movement, Outage, Queue, Reordering, Slot,
-            TargetOrder, TraceLoss,
+            Study, TargetOrder, TraceLoss,
         };
         let mut words = std::collections::BTreeSet::new();
         let mut count = 0;
@@ -324,6 +327,7 @@ mod tests {
                     Slot,
                     TargetOrder,
                     Movement,
+                    Study,
                     Listed(14),
                     Listed(16),
                 ] {

@@ -136,6 +136,12 @@ impl Variation {
         }
     }
 
+    /// Returns a value; [`Value::Absent`] for an index without a value.
+    #[must_use]
+    pub fn value(&self, place: usize) -> Value {
+        self.values.get(place).map_or(Value::Absent, |varied| varied.value.clone())
+    }
+
     /// Returns a value as written; empty for an index without a value.
     #[must_use]
     pub fn value_text(&self, place: usize) -> &str {
@@ -148,7 +154,9 @@ impl Variation {
         self.values.get(place).map_or_else(String::new, |varied| value_text(&varied.value))
     }
 
-    pub(crate) const fn kind(&self) -> Kind {
+    /// Returns the type of the values.
+    #[must_use]
+    pub const fn kind(&self) -> Kind {
         self.kind
     }
 

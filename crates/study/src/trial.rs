@@ -1,0 +1,116 @@
+//! The scene of a trial, for people or for modelled persons.
+
+use std::fmt::Write as _;
+
+use cohaptic_linkfile::FileError;
+use cohaptic_linkfile::document::key_text;
+use cohaptic_scene::{Scene, scene_text};
+
+use crate::model::{Person, Study};
+use crate::sequence::TrialPlan;
+
+/// Who moves the hands of a trial.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Players<'a> {
+    /// People: the hands are pointers.
+    People,
+    /// Modelled persons, indexed by seat: the hands are simulated.
+    Modelled(&'a [Person]),
+}
+
+/// The scene of a trial.
+#[derive(Clone, PartialEq, Debug)]
+pub struct TrialScene {
+    /// Text of the scene file: the scene of the study with the values of the condition, the seed of the trial and the analysed measures. The run ends with its
+    /// task.
+    pub text: String,
+    /// The same scene, read.
+    pub scene: Scene,
+    /// Index in [`Scene::peers`] of the hand of each person, indexed by seat.
+    pub hands: Vec<usize>,
+}
+
+impl Study {
+    /// Returns the scene of a trial.
+    ///
+    /// # Errors
+    ///
+    /// [`FileError`] if the scene is refused with these values. [`Study::read`] has read each condition, so this happens only for modelled persons whose
+    /// numbers are out of range.
+    pub fn trial_scene(&self, plan: &TrialPlan, players: Players<'_>) -> Result<TrialScene, FileError> {
+        let overrides = [format!("scene.seed={}", plan.seed)].into_iter().chain(self.players(players));
+        self.scene_with(plan.condition, overrides)
+    }
+
+    /// Reads the scene of a condition, as people play it.
+    pub(crate) fn check_condition(&self, condition: usize) -> Result<(), FileError> {
+        self.scene_with(condition, []).map(|_| ())
+    }
+
+    fn scene_with(&self, condition: usize, more: impl IntoIterator<Item = String>) -> Result<TrialScene, FileError> {
+        let measures: Vec<String> = self.measures.iter().map(|name| format!("\"{name}\"")).collect();
+        let mut overrides = self.conditions[condition].overrides.clone();
+        overrides.extend([format!("measure.names=[{}]", measures.join(", ")), "task.end=stop".to_owned()]);
+        overrides.extend(more);
+        let whole = scene_text(&self.scene_text, &self.scene_file, &overrides)?;
+        // Expectations hold for the scene as written. Each key at the top level has one line.
+        let text = whole.lines().filter(|line| !line.starts_with("expect = ")).fold(String::new(), |mut text, line| {
+            text.push_str(line);
+            text.push('\n');
+            text
+        });
+        let scene = Scene::parse_live(&text, &self.scene_file, &[])?;
+        let hands = self.hands.iter().filter_map(|name| scene.peer_index(name)).collect();
+        Ok(TrialScene { text, scene, hands })
+    }
+
+    /// Returns the overrides that put persons at the hands.
+    fn players(&self, players: Players<'_>) -> Vec<String> {
+        let Players::Modelled(persons) = players else { return Vec::new() };
+        let mut overrides = Vec::new();
+        for (name, person) in self.hands.iter().zip(persons) {
+            let peer = format!("peers.{}", key_text(name));
+            let Person { movement, visual_delay, reaction, noise } = person;
+            let mut keys = String::new();
+            for (key, duration) in [("move", movement), ("visual-delay", visual_delay), ("reaction", reaction)] {
+                write!(keys, "{key} = \"{}ns\", ", duration.as_nanos()).expect("writing to memory does not fail");
+            }
+            overrides.push(format!("{peer}.kind=simulated"));
+            overrides.push(format!("{peer}.hand={{ operator = {{ {keys}noise = {noise:?} }} }}"));
+        }
+        overrides
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use cohaptic_peer::Hand;
+    use cohaptic_scene::{PeerKind, TaskEnd};
+
+    use super::*;
+    use crate::codes::GroupCode;
+    use crate::sequence::{Sequence, Step};
+    use crate::testing::study;
+
+    #[test]
+    fn a_trial_has_the_values_of_its_condition_its_seed_and_its_players() {
+        let study = study();
+        let session = Sequence::new(&study, GroupCode::of_index(1), 1);
+        let Step::Trial(plan) = session.step() else { unreachable!() };
+        let people = study.trial_scene(&plan, Players::People).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(people.scene.seed, plan.seed);
+        assert_eq!((people.hands.as_slice(), people.scene.task.as_ref().map(|task| task.end)), (&[0, 1][..], Some(TaskEnd::Stop)));
+        assert!(people.hands.iter().all(|hand| matches!(people.scene.peers[*hand].kind, PeerKind::Pointer(..))));
+        assert!(people.scene.measure.is_some_and(|measure| measure.names.len() == 2));
+        // The second row of the square begins with the second condition, the longer delay.
+        assert_eq!((plan.condition, people.scene.links.between(0, 1).mean_delay()), (1, Duration::from_millis(100)));
+        let slow = Person { movement: Duration::from_millis(400), ..study.operator };
+        let modelled = study.trial_scene(&plan, Players::Modelled(&[slow, study.operator])).unwrap_or_else(|error| panic!("{error}"));
+        assert!(modelled.scene.peers.iter().all(|peer| matches!(peer.kind, PeerKind::Simulated)));
+        assert!(matches!(modelled.scene.peers[0].hand, Hand::Operator { .. }));
+        // The text alone is the scene.
+        assert_eq!(Scene::parse(&modelled.text, &study.scene_file, &[]).unwrap(), modelled.scene);
+    }
+}
