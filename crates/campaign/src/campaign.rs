@@ -380,7 +380,7 @@ impl Campaign {
     }
 
     pub(crate) fn head<'a>(&'a self, about: &'a str) -> Head<'a> {
-        Head { columns: &self.columns, about, program: self.plan.program() }
+        Head { columns: &self.columns, about: ("cohaptic.campaign", about), program: self.plan.program() }
     }
 
     /// Reads the table and sums it up. `computed`: number of runs done by this call.

@@ -68,7 +68,7 @@ pub use report::{CombinationReport, MOST_COMBINATIONS_OF_QUANTILES, MOST_RUNS_OF
 pub use shard::{Missing, Shard, ShardError, is_log, worker_log};
 pub use shared::{FolderState, PartState, ShardReport, SharedCampaign};
 pub use spread::SpreadCampaign;
-pub use table::{Column, Format, Row};
+pub use table::{Column, Format, Row, write_table};
 pub use value::{Kind, Value};
 pub use vary::{Variation, VaryError, split_at_commas};
 pub use verdicts::Judge;

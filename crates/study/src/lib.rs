@@ -20,17 +20,31 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod analysis;
 mod codes;
+mod dry_run;
+mod error;
+mod folder;
 mod model;
 mod order;
 mod read;
+mod report;
 mod sequence;
+mod statistics;
+mod tables;
 #[cfg(test)]
 mod testing;
 mod trial;
+mod written;
 
+pub use analysis::{Analysed, Analysis};
 pub use codes::{CodeError, GroupCode, PersonCode, TrialCode};
+pub use dry_run::{DifferencePower, NoWatch, Power, Watch, power_lines};
+pub use error::StudyError;
+pub use folder::{RoundTrip, StudyFolder, TrialFacts, TrialRecord};
 pub use model::{After, Breaks, Condition, Factor, Order, Person, Question, QuestionKind, Study, TLX};
 pub use read::ROOT;
 pub use sequence::{Answer, EndedTrial, Event, Fault, GivenAnswer, Sequence, SequenceError, Step, TrialPlan};
+pub use statistics::{ConditionMean, Difference, LEAST_UNITS, condition_means, differences_to_first, effect, holm, sign_flip};
 pub use trial::{Players, TrialScene};
+pub use written::Verified;

@@ -1,5 +1,6 @@
 //! Model of a checked study: [`Study`] and the types of its fields.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -13,6 +14,8 @@ pub struct Study {
     pub file: PathBuf,
     /// Text of the study file.
     pub text: String,
+    /// Texts of the files that the study names, indexed by the name as written.
+    pub files: BTreeMap<String, String>,
     /// Title for people.
     pub title: String,
     /// Seed of orders, of trials and of modelled persons.

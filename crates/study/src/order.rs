@@ -5,6 +5,18 @@ use cohaptic_wan::random::{Purpose, Stream};
 use crate::model::{Order, Study};
 
 impl Study {
+    /// Returns the row of a slot, from 0: a row of the Williams design, which repeats after its last row, or the slot itself.
+    #[must_use]
+    pub fn row_of(&self, slot: usize) -> usize {
+        if self.order == Order::Williams { slot % self.order_rows() } else { slot }
+    }
+
+    /// Returns the number of rows of the Williams design of the conditions.
+    #[must_use]
+    pub(crate) fn order_rows(&self) -> usize {
+        williams(self.conditions.len()).len()
+    }
+
     /// Returns the order of the conditions of a slot, as indices of conditions. A study has a slot for each group that it needs; the slot of an abandoned group
     /// is given again.
     #[must_use]
@@ -13,11 +25,7 @@ impl Study {
         match self.order {
             Order::Given => (0..count).collect(),
             Order::Shuffled => shuffled(self.seed, slot, count),
-            Order::Williams => {
-                let mut rows = williams(count);
-                let row = slot % rows.len();
-                rows.swap_remove(row)
-            }
+            Order::Williams => williams(count).swap_remove(self.row_of(slot)),
         }
     }
 }

@@ -109,7 +109,7 @@ mod tests {
         let slow = Person { movement: Duration::from_millis(400), ..study.operator };
         let modelled = study.trial_scene(&plan, Players::Modelled(&[slow, study.operator])).unwrap_or_else(|error| panic!("{error}"));
         assert!(modelled.scene.peers.iter().all(|peer| matches!(peer.kind, PeerKind::Simulated)));
-        assert!(matches!(modelled.scene.peers[0].hand, Hand::Operator { .. }));
+        assert!(matches!(modelled.scene.peers[0].hand, Some(Hand::Operator { .. })));
         // The text alone is the scene.
         assert_eq!(Scene::parse(&modelled.text, &study.scene_file, &[]).unwrap(), modelled.scene);
     }

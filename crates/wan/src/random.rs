@@ -304,8 +304,8 @@ mod tests {
     #[test]
     fn no_two_draws_share_an_address() {
         use Purpose::{
-            Corruption, CrossTraffic, Duplication, InitialState, Jitter, Listed, Loss, Modulation, Movement, Outage, Queue, Reordering, Slot,
-            Study, TargetOrder, TraceLoss,
+            Corruption, CrossTraffic, Duplication, InitialState, Jitter, Listed, Loss, Modulation, Movement, Outage, Queue, Reordering, Slot, Study,
+            TargetOrder, TraceLoss,
         };
         let mut words = std::collections::BTreeSet::new();
         let mut count = 0;

@@ -22,7 +22,7 @@ impl Estimate {
     /// Estimates the mean of these values; `None` for an empty slice. Equal values give exactly that mean and a half width of 0, without the rounding error of
     /// a sum.
     #[must_use]
-    pub(crate) fn of(values: &[f64]) -> Option<Self> {
+    pub fn of(values: &[f64]) -> Option<Self> {
         let first = *values.first()?;
         let n = count(values.len() as u64);
         // The sum of equal values is rounded, so the general formula would give a small deviation in place of 0.

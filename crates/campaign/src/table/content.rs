@@ -21,8 +21,8 @@ pub(crate) struct OpenPart {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Head<'a> {
     pub(crate) columns: &'a [Column],
-    /// Text of the manifest, stored by formats with a place for it.
-    pub(crate) about: &'a str,
+    /// Key and text of the origin of the table, such as the manifest of a campaign, stored by formats with a place for it.
+    pub(crate) about: (&'a str, &'a str),
     /// Name and version of the writing program.
     pub(crate) program: &'a str,
 }

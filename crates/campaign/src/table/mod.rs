@@ -8,6 +8,8 @@ mod memory;
 mod parquet_file;
 mod row;
 
+use std::io::{self, Write};
+
 use crate::value::{Kind, Value};
 
 pub(crate) use columns::{Roster, columns};
@@ -29,3 +31,22 @@ pub struct Column {
 
 /// The values of a run, indexed by column.
 pub type Row = Vec<Value>;
+
+/// Writes a table of any rows as a file of its own. `about`: key and text of the origin, which Parquet keeps as metadata. `program`: name and version of the
+/// writing program.
+///
+/// # Errors
+///
+/// The error of the writer, or [`io::ErrorKind::Other`] for rows that do not have the columns.
+pub fn write_table(
+    format: Format,
+    to: &mut (impl Write + Send),
+    columns: &[Column],
+    rows: &[Row],
+    (about, program): ((&str, &str), &str),
+) -> io::Result<()> {
+    format.write(to, Head { columns, about, program }, rows).map_err(|error| match error {
+        TableError::Io(error) => error,
+        error @ (TableError::Content(_) | TableError::Part { .. }) => io::Error::other(error.to_string()),
+    })
+}

@@ -8,7 +8,9 @@ use crate::model::{Condition, Factor};
 
 /// Reads the factors and their product. Without the table there is one condition, the scene as written.
 pub(super) fn read_conditions(node: Option<&Node>, most: usize, context: Context<'_>) -> Option<(Vec<Factor>, Vec<Condition>)> {
-    let Some(node) = node else { return Some((Vec::new(), vec![Condition { overrides: Vec::new(), values: Vec::new(), label: "scene".to_owned() }])) };
+    let Some(node) = node else {
+        return Some((Vec::new(), vec![Condition { overrides: Vec::new(), values: Vec::new(), label: "scene".to_owned() }]));
+    };
     let Some(table) = node.as_table() else {
         context.fault_at(node, format!("found {}: expected a table such as {{ \"link.delay\" = [\"0ms\", \"100ms\"] }}", node.describe()));
         return None;
@@ -44,8 +46,12 @@ fn read_factor(key: &str, node: &Node, context: Context<'_>) -> Option<Variation
     }
     let written = elements.iter().map(|element| match &element.value {
         // A word stands as it is, as in a campaign: a strategy may have settings in braces.
-        Value::Text(text) if !text.contains([',', '"', '\'', '[', '\n']) && !text.contains("..") && text.trim() == text && !text.is_empty() => text.clone(),
-        Value::Text(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) | Value::Date | Value::List(_) | Value::Table(_) => value_text(element),
+        Value::Text(text) if !text.contains([',', '"', '\'', '[', '\n']) && !text.contains("..") && text.trim() == text && !text.is_empty() => {
+            text.clone()
+        }
+        Value::Text(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) | Value::Date | Value::List(_) | Value::Table(_) => {
+            value_text(element)
+        }
     });
     match Variation::parse(&format!("{key}={}", written.collect::<Vec<_>>().join(","))) {
         Ok(variation) => Some(variation),

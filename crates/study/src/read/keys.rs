@@ -8,7 +8,11 @@ use crate::model::{After, Order};
 /// Keys at the top level of a study file.
 pub static ROOT: Table = Table::of(&[&[
     required("study", Form::Table(&STUDY), "Scene, people, trials and order").expecting("a table [study] with a scene"),
-    optional("conditions", Form::Table(&CONDITIONS), "Keys of the scene that differ between conditions, each with its values; the last key varies fastest"),
+    optional(
+        "conditions",
+        Form::Table(&CONDITIONS),
+        "Keys of the scene that differ between conditions, each with its values; the last key varies fastest",
+    ),
     optional("questions", Form::List(&Form::Table(&QUESTION)), "Questions, one or a group of scales per entry"),
     required("analysis", Form::Table(&ANALYSIS), "Analysed measures").expecting("a table [analysis] with measures"),
     optional("operator", Form::Table(&OPERATOR), "Means of the modelled persons of the dry run"),

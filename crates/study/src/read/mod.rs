@@ -4,13 +4,14 @@ mod conditions;
 mod keys;
 mod questions;
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use cohaptic_linkfile::FileError;
 use cohaptic_linkfile::document::{Node, Sources, quote};
 use cohaptic_linkfile::reading::named_file::{file_path, read_file};
-use cohaptic_linkfile::reading::{Context, TableReader, default_title, one_of, parse, values, with_text};
+use cohaptic_linkfile::reading::{Context, FileReader, TableReader, default_title, one_of, parse_with, values, with_text};
 use cohaptic_scene::{Measure, MeasureName, PeerKind, Scene, Scope, scene_content_of_text};
 use cohaptic_units::print::Counted;
 
@@ -38,7 +39,12 @@ impl Study {
     ///
     /// As [`Study::read`].
     pub fn parse(text: &str, file: &Path) -> Result<Self, FileError> {
-        let study = parse(Sources { file, text, overrides: &[] }, read_document)?.whole;
+        Self::parse_with(text, file, FileReader(&cohaptic_files::read_bytes))
+    }
+
+    /// Like [`Study::parse`], but `reader` reads the named files.
+    pub(crate) fn parse_with(text: &str, file: &Path, reader: FileReader<'_>) -> Result<Self, FileError> {
+        let study = parse_with(Sources { file, text, overrides: &[] }, reader, read_document)?.whole;
         // Every condition is read once here: a fault must not wait until a group comes to its trial.
         for condition in 0..study.conditions.len() {
             study.check_condition(condition)?;
@@ -50,9 +56,10 @@ impl Study {
 /// Header of a study. A field is `None` after a refused value.
 #[derive(Debug, Default)]
 struct Header<'a> {
+    files: BTreeMap<String, String>,
     title: Option<Option<String>>,
     seed: Option<u64>,
-    scene: Option<(std::path::PathBuf, String)>,
+    scene: Option<(PathBuf, String)>,
     scene_node: Option<&'a Node>,
     participants: Option<usize>,
     participants_node: Option<&'a Node>,
@@ -102,6 +109,7 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Study> {
     Some(Study {
         file: context.sources.file.to_path_buf(),
         text: context.sources.text.to_owned(),
+        files: header.files,
         title: header.title?.unwrap_or_else(|| default_title(context.sources.file)),
         seed: header.seed?,
         scene_file,
@@ -125,20 +133,36 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Study> {
 
 fn read_header<'a>(node: &'a Node, context: Context<'a>) -> Option<Header<'a>> {
     let mut table = TableReader::new(node, context, &STUDY, "a table such as [study]")?;
+    let mut files = BTreeMap::new();
     let title = table.maybe("title", |node, context| values::text(node, context, "a text").map(str::to_owned));
     let (scene_node, participants_node) = (table.get("scene"), table.get("participants"));
-    let scene = table.read("scene", |node, context| {
-        let path = file_path(node, context, "a scene file such as \"pull.toml\"")?;
-        read_file(node, context, &path, "a scene", |text| Ok(text.to_owned())).map(|text| (path, text))
-    });
+    let scene = table.read("scene", |node, context| read_named(node, "a scene file such as \"pull.toml\"", &mut files, context));
     let count = |count: u64| usize::try_from(count).unwrap_or(usize::MAX);
     let (participants, group) = (table.value("participants").map(count), table.value("group").map(count));
     let (order, seed) = (table.choice("order", &ORDERS), table.value("seed"));
     let (trials, practice) = (table.value("trials").map(count), table.value("practice").map(count));
     let breaks = table.maybe("break", read_break);
-    let (consent, instructions) = (table.read("consent", read_page), table.read("instructions", read_page));
+    let mut page = |name: &'static str| {
+        table.read(name, |node, context| read_named(node, "a file of Markdown such as \"consent.md\"", &mut files, context)).map(|(_, text)| text)
+    };
+    let (consent, instructions) = (page("consent"), page("instructions"));
     table.finish();
-    Some(Header { title, seed, scene, scene_node, participants, participants_node, group, order, trials, practice, breaks, consent, instructions })
+    Some(Header {
+        files,
+        title,
+        seed,
+        scene,
+        scene_node,
+        participants,
+        participants_node,
+        group,
+        order,
+        trials,
+        practice,
+        breaks,
+        consent,
+        instructions,
+    })
 }
 
 fn read_break(node: &Node, context: Context<'_>) -> Option<Breaks> {
@@ -149,10 +173,12 @@ fn read_break(node: &Node, context: Context<'_>) -> Option<Breaks> {
     Some(Breaks { every: usize::try_from(every).unwrap_or(usize::MAX), at_least: at_least? })
 }
 
-/// Reads the text of a page for people.
-fn read_page(node: &Node, context: Context<'_>) -> Option<String> {
-    let path = file_path(node, context, "a file of Markdown such as \"consent.md\"")?;
-    read_file(node, context, &path, "a page", |text| Ok(text.to_owned()))
+/// Reads the text of a named file, and notes the text under the name as written. Returns path and text.
+fn read_named(node: &Node, expected: &str, files: &mut BTreeMap<String, String>, context: Context<'_>) -> Option<(PathBuf, String)> {
+    let path = file_path(node, context, expected)?;
+    let text = read_file(node, context, &path, "a text", |text| Ok(text.to_owned()))?;
+    files.insert(node.as_text()?.to_owned(), text.clone());
+    Some((path, text))
 }
 
 /// Reads the scene as for a session, and refuses scenes of which a study cannot keep everything.
@@ -167,7 +193,10 @@ fn read_scene(node: &Node, path: &Path, text: &str, context: Context<'_>) -> Opt
         }
     };
     if let Some(name) = content.files.keys().next() {
-        context.fault_at(node, format!("the scene names the file {name}, and a study keeps nothing but the scene: expected a scene without other files"));
+        context.fault_at(
+            node,
+            format!("the scene names the file {name}, and a study keeps nothing but the scene: expected a scene without other files"),
+        );
         return None;
     }
     if scene.task.is_none() {
@@ -225,7 +254,11 @@ fn read_measure(node: &Node, scene: Option<&Scene>, context: Context<'_>) -> Opt
     let known: Vec<String> = MeasureName::all(scene.peers.len(), true).into_iter().filter(fits).map(|name| name.text(scene)).collect();
     if !known.iter().any(|known| known == name) {
         let of_peer = Measure::ALL.iter().any(|measure| measure.scope() == Scope::Peer && measure.name() == name);
-        let way_out = if of_peer { format!("peers.{}.{name}, with the name of a peer", scene.peers[0].name) } else { one_of(known.iter().map(String::as_str), name) };
+        let way_out = if of_peer {
+            format!("peers.{}.{name}, with the name of a peer", scene.peers[0].name)
+        } else {
+            one_of(known.iter().map(String::as_str), name)
+        };
         context.fault_at(node, format!("unknown measure {}: expected {way_out}", quote(name)));
         return None;
     }

@@ -13,6 +13,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use cohaptic_wan::random::{Purpose, Stream};
+use serde::{Deserialize, Serialize};
 
 use crate::codes::{GroupCode, PersonCode, TrialCode};
 use crate::model::{After, Breaks, Question, Study};
@@ -50,7 +51,8 @@ pub struct EndedTrial {
 }
 
 /// A given answer with its place in the session.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct GivenAnswer {
     /// Seat of the person in the group, from 0.
     pub seat: usize,

@@ -49,7 +49,11 @@ fn an_invalid_trial_is_repeated_once_at_the_end_of_its_block() {
 
 #[test]
 fn the_experimenter_repeats_the_last_valid_trial_of_the_block_and_no_other() {
-    let scale = Question { name: "felt".to_owned(), after: After::Condition, kind: QuestionKind::Scale { text: String::new(), ends: Default::default(), steps: 7 } };
+    let scale = Question {
+        name: "felt".to_owned(),
+        after: After::Condition,
+        kind: QuestionKind::Scale { text: String::new(), ends: Default::default(), steps: 7 },
+    };
     let study = Study { practice: 1, trials: 2, questions: vec![scale], breaks: None, ..study() };
     let mut session = session(&study, 0);
     assert_eq!(session.handle(Event::Repeat), Err(SequenceError::NothingToRepeat));
@@ -71,7 +75,8 @@ fn the_experimenter_repeats_the_last_valid_trial_of_the_block_and_no_other() {
 
 #[test]
 fn breaks_come_after_every_few_trials_and_not_at_the_end() {
-    let study = Study { practice: 0, trials: 3, questions: Vec::new(), breaks: Some(Breaks { every: 4, at_least: Duration::from_secs(30) }), ..study() };
+    let study =
+        Study { practice: 0, trials: 3, questions: Vec::new(), breaks: Some(Breaks { every: 4, at_least: Duration::from_secs(30) }), ..study() };
     let mut session = session(&study, 1);
     let mut breaks = Vec::new();
     loop {

@@ -26,9 +26,6 @@ use super::{Column, Kind, Row, Value};
 pub(super) use merge::merge;
 pub(super) use read::{read_columns, read_gists};
 
-/// Key of the manifest's text in the metadata of a file.
-const ABOUT: &str = "cohaptic.campaign";
-
 pub(super) fn write(to: &mut (impl Write + Send), head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
     let mut writer = SerializedFileWriter::new(to, schema(head.columns)?, properties(head))?;
     let mut group = writer.next_row_group()?;
@@ -56,7 +53,8 @@ fn properties(head: Head<'_>) -> WriterPropertiesPtr {
 }
 
 fn about(head: Head<'_>) -> KeyValue {
-    KeyValue::new(ABOUT.to_owned(), head.about.to_owned())
+    let (key, text) = head.about;
+    KeyValue::new(key.to_owned(), text.to_owned())
 }
 
 fn schema(columns: &[Column]) -> Result<TypePtr, ParquetError> {

@@ -70,7 +70,7 @@ fn by_the_library(head: Head<'_>, parts: &[(PathBuf, u64)]) -> Vec<u8> {
 fn the_bytes_are_those_of_the_library_and_nothing_else_stays_in_the_folder() {
     let folder = tempfile::tempdir().unwrap();
     let columns = columns();
-    let head = Head { columns: &columns, about: "{}", program: "a program" };
+    let head = Head { columns: &columns, about: ("cohaptic.campaign", "{}"), program: "a program" };
     let all = parts(folder.path(), head, 300);
     let table = folder.path().join("runs.parquet");
     for count in [0, 1, 14, 15, 16, 300] {
@@ -84,7 +84,7 @@ fn the_bytes_are_those_of_the_library_and_nothing_else_stays_in_the_folder() {
 fn they_are_so_with_more_row_groups_than_have_a_place() {
     let folder = tempfile::tempdir().unwrap();
     let columns = columns();
-    let head = Head { columns: &columns[..1], about: "{}", program: "a program" };
+    let head = Head { columns: &columns[..1], about: ("cohaptic.campaign", "{}"), program: "a program" };
     let path = folder.path().join("part-00000.parquet");
     write_whole(&path, |file| write(file, head, &[row(0)[..1].to_vec()])).unwrap();
     let parts = vec![(path, 1); 32_768];
@@ -95,7 +95,7 @@ fn they_are_so_with_more_row_groups_than_have_a_place() {
 fn a_row_group_at_a_time_says_what_the_library_reads() {
     let folder = tempfile::tempdir().unwrap();
     let columns = columns();
-    let head = Head { columns: &columns, about: "{}", program: "a program" };
+    let head = Head { columns: &columns, about: ("cohaptic.campaign", "{}"), program: "a program" };
     let all = parts(folder.path(), head, 40);
     let table = folder.path().join("runs.parquet");
     merged(&table, head, &all);
@@ -122,7 +122,7 @@ fn a_row_group_at_a_time_says_what_the_library_reads() {
 fn a_table_that_is_not_as_it_was_written_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let columns = columns();
-    let head = Head { columns: &columns, about: "{}", program: "a program" };
+    let head = Head { columns: &columns, about: ("cohaptic.campaign", "{}"), program: "a program" };
     let all = parts(folder.path(), head, 3);
     let table = folder.path().join("runs.parquet");
     let whole = merged(&table, head, &all);
@@ -172,7 +172,7 @@ fn no_more_memory_is_taken_by_more_parts() {
     };
     let folder = tempfile::tempdir().unwrap();
     let columns: Vec<Column> = std::iter::repeat_n(columns(), 13).flatten().collect();
-    let head = Head { columns: &columns, about: "{}", program: "a program" };
+    let head = Head { columns: &columns, about: ("cohaptic.campaign", "{}"), program: "a program" };
     let path = folder.path().join("part-00000.parquet");
     let row: Row = std::iter::repeat_n(row(0), 13).flatten().collect();
     write_whole(&path, |file| write(file, head, &[row])).unwrap();

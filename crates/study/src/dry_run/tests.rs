@@ -1,0 +1,148 @@
+use std::cell::Cell;
+use std::collections::BTreeMap;
+use std::fs;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::*;
+use crate::codes::GroupCode;
+use crate::model::{Order, QuestionKind};
+use crate::statistics::effect;
+use crate::testing::study;
+
+/// A study of two groups, with short trials.
+fn short() -> Study {
+    let study = study();
+    let conditions = vec![study.conditions[0].clone(), study.conditions[1].clone()];
+    Study { groups: 2, trials: 2, order: Order::Given, conditions, ..study }
+}
+
+/// Stops after some trials.
+struct StopAfter(AtomicUsize);
+
+impl Watch for StopAfter {
+    fn keep_going(&self) -> bool {
+        self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1)).is_ok()
+    }
+}
+
+/// Files of a folder by path, with their bytes.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(path) = folders.pop() {
+        for entry in fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()) {
+            if entry.is_dir() {
+                folders.push(entry);
+            } else {
+                files.insert(entry.strip_prefix(folder).unwrap().display().to_string(), fs::read(&entry).unwrap());
+            }
+        }
+    }
+    files
+}
+
+fn played(study: &Study, path: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut folder = StudyFolder::open_dry(study.clone(), path, "a test").unwrap();
+    assert!(folder.play_dry(&NoWatch).unwrap());
+    drop(folder);
+    files(path)
+}
+
+#[test]
+fn persons_spread_around_the_study_and_keep_their_numbers() {
+    let study = study();
+    let persons: Vec<Person> = (0..400).map(|index| study.person(GroupCode::of_index(index).person(0, 1))).collect();
+    assert_eq!(persons[17], study.person(GroupCode::of_index(8).person(1, 2)));
+    for factors in [
+        persons.iter().map(|person| person.movement.as_secs_f64() / 0.25).collect::<Vec<f64>>(),
+        persons.iter().map(|person| person.visual_delay.as_secs_f64() / 0.2).collect(),
+        persons.iter().map(|person| person.noise / 0.1).collect(),
+    ] {
+        let logs: Vec<f64> = factors.into_iter().map(f64::ln).collect();
+        let mean = logs.iter().sum::<f64>() / 400.0;
+        // Mean 0 ± 0.15/√400, and the standard deviation within 15 %: four standard errors of 400 normals.
+        let deviation = mean / effect(&logs).unwrap();
+        assert!(mean.abs() < 0.03 && (deviation.abs() - 0.15).abs() < 0.022, "{mean} {deviation}");
+    }
+}
+
+#[test]
+fn a_dry_run_that_is_stopped_anywhere_gives_the_bytes_of_one_that_is_not() {
+    let (one, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let study = short();
+    let whole = played(&study, one.path());
+    assert!(whole.contains_key("report.html") && whole.contains_key("trials/G02-006/trial.json"), "{:?}", whole.keys());
+    let calls = Cell::new(0);
+    loop {
+        let mut folder = StudyFolder::open_dry(study.clone(), other.path(), "a test").unwrap();
+        calls.set(calls.get() + 1);
+        if folder.play_dry(&StopAfter(AtomicUsize::new(calls.get() % 3))).unwrap() {
+            break;
+        }
+    }
+    assert!(calls.get() > 5);
+    let stopped = files(other.path());
+    assert_eq!(whole.keys().collect::<Vec<_>>(), stopped.keys().collect::<Vec<_>>());
+    for (name, bytes) in &whole {
+        assert!(stopped[name] == *bytes, "{name}");
+    }
+    // A study in another place, or with people, is another study.
+    let moved = Study { title: String::new(), text: study.text.replace("seed = 1", "seed = 2"), ..study.clone() };
+    let refused = StudyFolder::open_dry(moved, other.path(), "a test").unwrap_err().to_string();
+    assert!(refused.contains("the study file says something else"), "{refused}");
+    let refused = StudyFolder::open(study, other.path(), "a test").unwrap_err().to_string();
+    assert!(refused.contains("a dry run there, a study with people here"), "{refused}");
+}
+
+#[test]
+fn answers_are_possible_ones_and_use_the_whole_scale() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = short();
+    let folder = StudyFolder::open_dry(study.clone(), folder.path(), "a test").unwrap();
+    let mut session = Sequence::new(&study, GroupCode::of_index(0), 0);
+    let mut seen = std::collections::BTreeSet::new();
+    assert!(matches!(study.questions[0].kind, QuestionKind::Tlx));
+    for group in 0..40 {
+        session = Sequence::new(&study, GroupCode::of_index(group), 0);
+        let answer = folder.drawn_answer(&session, 0, 0);
+        assert!(answer.values.len() == 6 && answer.values.iter().all(|value| study.questions[0].accepts(*value)), "{answer:?}");
+        seen.extend(answer.values);
+    }
+    assert_eq!(folder.drawn_answer(&session, 0, 0), folder.drawn_answer(&session, 0, 0));
+    assert_eq!(seen.len(), 21, "{seen:?}");
+}
+
+/// With equal conditions the test finds a difference in at most 5 % of all studies. Each of the 24 runs has seven groups, for which p is a multiple of 1/64, and
+/// the largest p below 0.05 is 3/64. Of 24 binomial tries with 3/64, 6 or more successes have a probability of 7·10⁻⁴.
+#[test]
+fn equal_conditions_are_rarely_found_to_differ() {
+    let study = short();
+    let equal = vec![study.conditions[0].clone(), study.conditions[0].clone()];
+    let study = Study { groups: 7, trials: 1, practice: 0, conditions: equal, measures: vec!["internal_force_n".to_owned()], ..study };
+    let found = (0..24).filter(|seed| {
+        let analysis = power::analysis_of(&Study { seed: *seed, ..study.clone() }, &NoWatch).unwrap().unwrap();
+        assert_eq!((analysis.units, analysis.measures[0].rows.len()), (7, 7));
+        analysis.measures[0].differences[0].p < 0.05
+    });
+    let found = found.count();
+    assert!(found < 6, "{found}");
+}
+
+#[test]
+fn a_longer_delay_is_found_and_the_kept_runs_are_the_same_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = Study { groups: 6, trials: 1, practice: 0, ..short() };
+    let mut kept = StudyFolder::open_dry(study.clone(), folder.path(), "a test").unwrap();
+    assert!(kept.play_dry(&NoWatch).unwrap());
+    let power = kept.power(4, &NoWatch).unwrap().unwrap();
+    assert_eq!((power.times, power.differences.len()), (4, 2));
+    let time = &power.differences[0];
+    assert_eq!((time.measure.as_str(), time.condition, time.alone.of), ("task_time_s", 1, 4));
+    // The kept runs are read, and a further one is added to them.
+    assert_eq!(kept.power(4, &StopAfter(AtomicUsize::new(0))).unwrap().as_ref(), Some(&power));
+    assert_eq!(kept.power(5, &StopAfter(AtomicUsize::new(0))).unwrap(), None);
+    assert_eq!(kept.power(5, &NoWatch).unwrap().unwrap().times, 5);
+    let lines = power_lines(&study, &power);
+    assert_eq!(lines.len(), 3);
+    assert!(lines[1].starts_with("task_time_s  "), "{lines:?}");
+}

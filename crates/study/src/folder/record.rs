@@ -1,0 +1,144 @@
+//! `trial.json`: what a trial gave, and how well it ran. The measures come from the replay of its scene and its inputs.
+
+use std::io::Write as _;
+use std::path::Path;
+
+use cohaptic_files::{read_text, write_whole};
+use cohaptic_harness::live::{Inputs, RecordedScene, replay};
+use cohaptic_harness::measures::Measures;
+use cohaptic_scene::{Scene, link_keys_of_text, scene_content_of_text};
+use serde::{Deserialize, Serialize};
+
+use crate::codes::TrialCode;
+use crate::error::StudyError;
+use crate::sequence::Fault;
+
+/// How well a trial ran.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct TrialFacts {
+    /// Reasons for which the trial is not valid; empty for a valid trial.
+    pub faults: Vec<Fault>,
+    /// Ticks that were late by the clock of the computer.
+    pub late_ticks: u64,
+    /// Round trips between the computer and the browser of each person, indexed by seat; `None` where nothing was measured. Empty for a dry run.
+    pub round_trips: Vec<Option<RoundTrip>>,
+}
+
+/// Round trips to a browser. They add to the delay of the scene.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RoundTrip {
+    /// Median \[s\].
+    pub p50_s: f64,
+    /// Quantile of 99 % \[s\].
+    pub p99_s: f64,
+}
+
+/// What is kept of a trial beside its scene and its inputs.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrialRecord {
+    /// Code of the trial.
+    pub trial: TrialCode,
+    /// Reasons for which the trial was not valid when it ended.
+    pub faults: Vec<Fault>,
+    /// Ticks that were late by the clock of the computer.
+    pub late_ticks: u64,
+    /// Round trips to the browsers, indexed by seat.
+    pub round_trips: Vec<Option<RoundTrip>>,
+    /// Outcome of the task in a word.
+    pub outcome: String,
+    /// Time from the start of the task to its outcome \[s\].
+    pub time_s: f64,
+    /// Values of the measures, in the order of [`Study::measures`](crate::Study::measures); `None` for a measure without a value.
+    pub values: Vec<(String, Option<f64>)>,
+}
+
+/// Name of the record in the folder of a trial.
+const RECORD: &str = "trial.json";
+
+impl TrialRecord {
+    /// Returns the record of the trial in a folder, whose scene and inputs are replayed.
+    pub(crate) fn of(trial: TrialCode, folder: &Path, facts: TrialFacts) -> Result<Self, StudyError> {
+        let TrialFacts { mut faults, late_ticks, round_trips } = facts;
+        faults.sort_unstable();
+        faults.dedup();
+        let Replayed { outcome, time_s, values } = Replayed::of(folder)?;
+        Ok(Self { trial, faults, late_ticks, round_trips, outcome, time_s, values })
+    }
+
+    pub(crate) fn write(&self, folder: &Path) -> Result<(), StudyError> {
+        let path = folder.join(RECORD);
+        let text = serde_json::to_string_pretty(self).expect("numbers and words are written as JSON") + "\n";
+        write_whole(&path, |file| file.write_all(text.as_bytes())).map_err(StudyError::file("write", &path))
+    }
+
+    pub(crate) fn read(folder: &Path) -> Result<Self, StudyError> {
+        let path = folder.join(RECORD);
+        let text = read_text(&path).map_err(StudyError::file("read", &path))?;
+        serde_json::from_str(&text).map_err(|error| StudyError::damaged(&path, error.to_string()))
+    }
+
+    /// Returns the value of a measure; `None` for a measure without a value.
+    pub(crate) fn value(&self, name: &str) -> Option<f64> {
+        self.values.iter().find(|(known, _)| known == name).and_then(|(_, value)| *value)
+    }
+
+    /// Returns the differences between the record and the replay of the trial's scene and inputs, in words.
+    pub(crate) fn differences(&self, folder: &Path) -> Result<Vec<String>, StudyError> {
+        let Replayed { outcome, time_s, values } = Replayed::of(folder)?;
+        let mut differences = Vec::new();
+        let mut compare = |name: &str, kept: String, replayed: String| {
+            if kept != replayed {
+                differences.push(format!("{name} is {kept} in the record and {replayed} in the replay"));
+            }
+        };
+        compare("outcome", self.outcome.clone(), outcome);
+        compare("time_s", format!("{:?}", self.time_s), format!("{time_s:?}"));
+        let text = |value: &Option<f64>| value.map_or_else(|| "nothing".to_owned(), |value| format!("{value:?}"));
+        for place in 0..self.values.len().max(values.len()) {
+            let name = |values: &[(String, Option<f64>)]| values.get(place).map(|(name, _)| name.clone());
+            let value = |values: &[(String, Option<f64>)]| values.get(place).map_or_else(|| "not there".to_owned(), |(_, value)| text(value));
+            let shown = name(&self.values).or_else(|| name(&values)).unwrap_or_default();
+            if name(&self.values) == name(&values) {
+                compare(&shown, value(&self.values), value(&values));
+            } else {
+                compare("a measure", name(&self.values).unwrap_or_default(), name(&values).unwrap_or_default());
+            }
+        }
+        Ok(differences)
+    }
+}
+
+/// What the replay of a trial gives.
+struct Replayed {
+    outcome: String,
+    time_s: f64,
+    values: Vec<(String, Option<f64>)>,
+}
+
+impl Replayed {
+    fn of(folder: &Path) -> Result<Self, StudyError> {
+        let (scene_file, inputs_file) = (folder.join("scene.toml"), folder.join("inputs.csv"));
+        let text = read_text(&scene_file).map_err(StudyError::file("read", &scene_file))?;
+        let scene = Scene::parse_live(&text, &scene_file, &[])?;
+        let rows = read_text(&inputs_file).map_err(StudyError::file("read", &inputs_file))?;
+        let refused = |message: String| StudyError::damaged(&inputs_file, message);
+        let content = scene_content_of_text(&text, &scene_file, &[])?;
+        let recorded = RecordedScene::read(&rows).map_err(|error| refused(error.to_string()))?;
+        let recorded = recorded.ok_or_else(|| refused("it does not say of which scene it is".to_owned()))?;
+        if let Some(difference) = recorded.differences(&RecordedScene::of(&scene, content)).first() {
+            return Err(refused(difference.to_string()));
+        }
+        let keys = link_keys_of_text(&text, &scene_file, &[])?.into_values().next();
+        let inputs = match keys {
+            Some(keys) => Inputs::read(&rows, &scene, &keys).map_err(|error| refused(error.to_string()))?,
+            None => Inputs::default(),
+        };
+        let Some(mut measures) = Measures::of(&scene) else { return Err(StudyError::damaged(&scene_file, "it measures nothing")) };
+        let Ok(summary) = replay(&scene, &inputs, &mut measures);
+        let Some(task) = measures.task(&summary) else { return Err(StudyError::damaged(&scene_file, "it has no task")) };
+        let values = measures.values(summary.duration).into_iter().map(|measured| (measured.name.text(&scene), measured.value));
+        Ok(Self { outcome: task.outcome.name().to_owned(), time_s: task.time.as_secs_f64(), values: values.collect() })
+    }
+}

@@ -1,0 +1,229 @@
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use super::*;
+use crate::dry_run::NoWatch;
+use crate::folder::{RoundTrip, TrialFacts};
+use crate::model::{Order, Study};
+use crate::sequence::{Event, Fault, Sequence, Step};
+use crate::testing::study;
+use crate::trial::Players;
+
+const PROGRAM: &str = "a test";
+
+/// Returns the names in a folder, in order.
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+/// A study of two groups and two conditions, with one trial each.
+fn short() -> Study {
+    let study = study();
+    let conditions = study.conditions[..2].to_vec();
+    Study { groups: 2, trials: 1, practice: 0, breaks: None, order: Order::Given, conditions, ..study }
+}
+
+/// Plays the study in a folder.
+fn played(path: &Path) -> StudyFolder {
+    let mut folder = StudyFolder::open_dry(short(), path, PROGRAM).unwrap();
+    assert!(folder.play_dry(&NoWatch).unwrap());
+    folder
+}
+
+fn lines(path: &Path) -> Vec<String> {
+    fs::read_to_string(path).unwrap().lines().map(str::to_owned).collect()
+}
+
+/// Returns a column of a table of comma-separated values without quotes.
+fn column(path: &Path, name: &str) -> Vec<String> {
+    let lines = lines(path);
+    let place = lines[0].split(',').position(|column| column == name).unwrap_or_else(|| panic!("{name} in {}", lines[0]));
+    lines[1..].iter().map(|line| line.split(',').nth(place).unwrap().to_owned()).collect()
+}
+
+#[test]
+fn a_study_is_read_from_its_folder_and_its_tables_are_made_again() {
+    let at = tempfile::tempdir().unwrap();
+    let folder = played(at.path());
+    assert!(folder.is_full() && folder.next_group().is_none());
+    let trials = at.path().join("trials.csv");
+    assert_eq!(column(&trials, "code"), ["P01", "P02", "P01", "P02", "P03", "P04", "P03", "P04"]);
+    assert_eq!(column(&trials, "hand"), ["left", "right"].repeat(4));
+    assert_eq!(column(&trials, "link.delay_ms"), ["0.0", "0.0", "100.0", "100.0"].repeat(2));
+    assert_eq!(column(&trials, "valid"), ["1"; 8]);
+    // Six scales and their mean, of four people after each of two conditions.
+    assert_eq!(lines(&at.path().join("answers.csv")).len(), 1 + 4 * 2 * 7);
+    let before = fs::read(&trials).unwrap();
+    drop(folder);
+    // The whole study is in the folder: another process needs neither the study file nor its place.
+    let again = StudyFolder::begin_again(at.path());
+    fs::remove_file(&trials).unwrap();
+    again.write_tables().unwrap();
+    assert_eq!(fs::read(&trials).unwrap(), before);
+}
+
+impl StudyFolder {
+    /// Opens a folder as it is, with the shortened study of these tests.
+    fn begin_again(path: &Path) -> Self {
+        Self::open_dry(short(), path, PROGRAM).unwrap()
+    }
+}
+
+#[test]
+fn only_one_process_works_on_a_folder_and_foreign_files_are_left_alone() {
+    let at = tempfile::tempdir().unwrap();
+    let _folder = StudyFolder::open(short(), at.path(), PROGRAM).unwrap();
+    assert!(matches!(StudyFolder::open(short(), at.path(), PROGRAM), Err(StudyError::Busy { .. })));
+    let other = tempfile::tempdir().unwrap();
+    fs::write(other.path().join("thesis.txt"), "").unwrap();
+    let refused = StudyFolder::open(short(), other.path(), PROGRAM).unwrap_err().to_string();
+    assert!(refused.contains("thesis.txt") && fs::read_dir(other.path()).unwrap().count() == 1, "{refused}");
+    assert!(matches!(StudyFolder::of_folder(other.path(), PROGRAM), Err(StudyError::NoStudy { .. })));
+}
+
+#[test]
+fn every_change_of_a_file_is_found() {
+    let at = tempfile::tempdir().unwrap();
+    let folder = played(at.path());
+    let verified = folder.verify().unwrap();
+    assert_eq!((verified.trials, verified.differences.as_slice()), (4, &[][..]));
+    let change = |file: &str, from: &str, to: &str, expected: &[&str]| {
+        let path = at.path().join(file);
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(text.contains(from), "{file} does not say {from}: {text}");
+        fs::write(&path, text.replacen(from, to, 1)).unwrap();
+        let found = folder.verify().unwrap().differences;
+        fs::write(&path, text).unwrap();
+        for words in expected {
+            assert!(found.iter().any(|difference| difference.contains(words)), "{file}: {words} in {found:?}");
+        }
+    };
+    change(
+        "trials/G01-001/trial.json",
+        "\"outcome\": \"done\"",
+        "\"outcome\": \"failed\"",
+        &["G01-001: outcome is failed in the record and done", "trials.csv: line 2"],
+    );
+    change(
+        "trials/G02-001/trial.json",
+        "\"internal_force_n\",\n      0.",
+        "\"internal_force_n\",\n      1.",
+        &["G02-001: internal_force_n is 1.", "trials.parquet"],
+    );
+    change("trials/G01-002/scene.toml", "mass = 0.45", "mass = 0.46", &["G01-002: ", "scene.toml is not the scene of this trial"]);
+    change("trials/G01-002/inputs.csv", "0,scene,,,", "0,scene,,,0", &["G01-002: "]);
+    change("trials.csv", "P03", "P09", &["trials.csv: line 6"]);
+    change("answers.csv", "P04", "P09", &["answers.csv"]);
+    fs::remove_file(at.path().join("answers.parquet")).unwrap();
+    assert_eq!(folder.verify().unwrap().differences, ["answers.parquet: not there: cohaptic study report writes it"]);
+}
+
+#[test]
+fn a_forgotten_person_leaves_nothing_and_the_row_is_given_again() {
+    let at = tempfile::tempdir().unwrap();
+    let mut folder = played(at.path());
+    let nobody = folder.forget("P09".parse().unwrap()).unwrap_err().to_string();
+    assert!(nobody.contains("P09"), "{nobody}");
+    folder.forget("P02".parse().unwrap()).unwrap();
+    let kept = names(&at.path().join("trials"));
+    assert_eq!(kept, ["G02-001", "G02-002"]);
+    assert_eq!(
+        column(&at.path().join("trials.csv"), "code").into_iter().collect::<BTreeSet<_>>(),
+        BTreeSet::from(["P03".to_owned(), "P04".to_owned()])
+    );
+    // The partner's answers stay.
+    let answers = column(&at.path().join("answers.csv"), "code").into_iter().collect::<BTreeSet<_>>();
+    assert_eq!(answers, ["P01", "P03", "P04"].map(str::to_owned).into());
+    assert!(!fs::read_to_string(at.path().join("report.html")).unwrap().contains("P02"));
+    assert_eq!(folder.verify().unwrap().differences, [""; 0]);
+    let next = folder.next_group().unwrap();
+    assert_eq!((next.group().to_string(), next.slot()), ("G03".to_owned(), 0));
+    // Also after a crash between the file of the session and the trials.
+    drop(folder);
+    fs::create_dir(at.path().join("trials/G01-001")).unwrap();
+    let mut folder = StudyFolder::begin_again(at.path());
+    assert_eq!(names(&at.path().join("trials")), ["G02-001", "G02-002"]);
+    folder.forget("P01".parse().unwrap()).unwrap();
+    assert!(!column(&at.path().join("answers.csv"), "code").contains(&"P01".to_owned()));
+}
+
+/// Records a trial in the staging folder as a session of people without any input does.
+fn staged(folder: &StudyFolder, session: &Sequence) {
+    let Step::Trial(plan) = session.step() else { panic!("{:?}", session.step()) };
+    let trial = folder.study().trial_scene(&plan, Players::People).unwrap();
+    let staging = folder.staging().unwrap();
+    fs::write(staging.join("scene.toml"), &trial.text).unwrap();
+    let content = cohaptic_scene::scene_content_of_text(&trial.text, &staging.join("scene.toml"), &[]).unwrap();
+    cohaptic_harness::record::InputRecorder::create(&staging, &trial.scene, content).unwrap().finish().unwrap();
+}
+
+#[test]
+fn a_trial_counts_once_it_has_its_name_and_an_abandoned_row_is_given_again() {
+    let at = tempfile::tempdir().unwrap();
+    let mut folder = StudyFolder::open(Study { trials: 2, questions: Vec::new(), ..short() }, at.path(), PROGRAM).unwrap();
+    let study = folder.study().clone();
+    let mut session = folder.next_group().unwrap();
+    staged(&folder, &session);
+    let facts =
+        TrialFacts { faults: vec![Fault::SilentPointer], late_ticks: 3, round_trips: vec![Some(RoundTrip { p50_s: 0.02, p99_s: 0.05 }), None] };
+    let record = folder.keep_trial(&mut session, facts).unwrap();
+    assert_eq!(record.outcome, "timed-out");
+    // The process is killed after the rename of a trial, before its line: both for the first trial and for a later one.
+    staged(&folder, &session);
+    folder.keep_trial(&mut session, TrialFacts::default()).unwrap();
+    let file = at.path().join("groups/G01.jsonl");
+    let text = fs::read_to_string(&file).unwrap();
+    for cut in [text.trim_end().rsplit_once('\n').map(|(before, _)| format!("{before}\n")), None] {
+        drop(folder);
+        match cut {
+            Some(cut) => fs::write(&file, cut).unwrap(),
+            None => {
+                fs::remove_file(&file).unwrap();
+                fs::remove_dir_all(at.path().join("trials/G01-002")).unwrap();
+            }
+        }
+        folder = StudyFolder::open(study.clone(), at.path(), PROGRAM).unwrap();
+        session = folder.next_group().unwrap();
+        let Step::Trial(plan) = session.step() else { panic!("{:?}", session.step()) };
+        assert_eq!((session.group().to_string(), plan.code.number), ("G01".to_owned(), fs::read_dir(at.path().join("trials")).unwrap().count() + 1));
+        assert_eq!(session.ended()[0].faults, [Fault::SilentPointer]);
+    }
+    assert!(matches!(folder.keep(&mut session, Event::BreakOver), Err(StudyError::Refused(_))));
+    folder.keep(&mut session, Event::Abandon).unwrap();
+    let next = folder.next_group().unwrap();
+    assert_eq!((next.group().to_string(), next.slot(), next.people()[0].to_string()), ("G02".to_owned(), 0, "P03".to_owned()));
+    folder.write_tables().unwrap();
+    let trials = at.path().join("trials.csv");
+    assert_eq!(column(&trials, "session"), ["abandoned", "abandoned"]);
+    assert_eq!(column(&trials, "faults"), ["silent-pointer", "silent-pointer"]);
+    assert_eq!(column(&trials, "round_trip_p50_s"), ["0.02", ""]);
+    assert_eq!(column(&trials, "late_ticks"), ["3", "3"]);
+    assert_eq!(column(&trials, "task_time_s"), ["", ""]);
+}
+
+#[test]
+fn a_damaged_session_is_refused_with_its_line() {
+    let at = tempfile::tempdir().unwrap();
+    drop(played(at.path()));
+    let file = at.path().join("groups/G01.jsonl");
+    let text = fs::read_to_string(&file).unwrap();
+    for (from, to, words) in [
+        ("\"slot\":0", "\"slot\":7", "line 1"),
+        ("trial-ended", "trial-begun", "line 2"),
+        ("\"values\":[", "\"values\":[1,", "line 3"),
+        ("\"group\":\"G01\"", "\"group\":\"G02\"", "line 1"),
+    ] {
+        assert!(text.contains(from), "{text}");
+        fs::write(&file, text.replacen(from, to, 1)).unwrap();
+        let refused = StudyFolder::open_dry(short(), at.path(), PROGRAM).unwrap_err();
+        assert!(matches!(refused, StudyError::Damaged { .. }) && refused.is_io(), "{refused}");
+        let refused = refused.to_string();
+        assert!(refused.contains(words) || refused.contains("no answer"), "{from}: {refused}");
+    }
+    fs::write(&file, &text).unwrap();
+    fs::rename(&file, at.path().join("groups/G03.jsonl")).unwrap();
+    assert!(StudyFolder::open_dry(short(), at.path(), PROGRAM).unwrap_err().to_string().contains("G01 is missing"));
+}

@@ -1,0 +1,85 @@
+//! Verification of a study: every trial is replayed, and every table is made again.
+
+use std::fs;
+
+use cohaptic_campaign::Format;
+use rayon::prelude::*;
+
+use crate::error::StudyError;
+use crate::folder::StudyFolder;
+use crate::tables::KeptTrial;
+use crate::trial::Players;
+
+/// Result of a verification.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Verified {
+    /// Number of replayed trials.
+    pub trials: usize,
+    /// Differences between what is kept and what the replays give, each with its place, in words.
+    pub differences: Vec<String>,
+}
+
+impl StudyFolder {
+    /// Replays every trial, and compares its measures with its record, its scene with the scene of its plan, and the tables with those of the records.
+    ///
+    /// # Errors
+    ///
+    /// [`StudyError::File`] if a file cannot be read. Files with another content are differences.
+    pub fn verify(&self) -> Result<Verified, StudyError> {
+        let trials = self.kept_trials()?;
+        let found: Vec<Vec<String>> = trials.par_iter().map(|trial| self.differences_of(trial)).collect::<Result<_, StudyError>>()?;
+        let mut differences: Vec<String> = found.into_iter().flatten().collect();
+        for (name, table) in [("trials", self.trial_table(&trials)), ("answers", self.answer_table())] {
+            for format in [Format::Csv, Format::Parquet] {
+                let file = format!("{name}.{}", format.name());
+                let path = self.path().join(&file);
+                let expected = self.table_bytes(format, &table).map_err(StudyError::file("write", &path))?;
+                match fs::read(&path) {
+                    Ok(bytes) if bytes == expected => {}
+                    Ok(bytes) => differences.push(format!("{file}: {}", first_difference(format, &bytes, &expected))),
+                    Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                        differences.push(format!("{file}: not there: cohaptic study report writes it"));
+                    }
+                    Err(error) => return Err(StudyError::file("read", &path)(error)),
+                }
+            }
+        }
+        Ok(Verified { trials: trials.len(), differences })
+    }
+
+    fn differences_of(&self, trial: &KeptTrial) -> Result<Vec<String>, StudyError> {
+        let plan = &trial.ended.plan;
+        let folder = self.trial(plan.code);
+        let of_trial = |difference: String| format!("{}: {difference}", plan.code);
+        let replayed = match trial.record.differences(&folder) {
+            Ok(differences) => differences,
+            // A damaged record or scene is what a verification looks for.
+            Err(error @ (StudyError::Damaged { .. } | StudyError::Study(_))) => vec![error.to_string()],
+            Err(error) => return Err(error),
+        };
+        let persons = self
+            .is_dry()
+            .then(|| (0..self.study().group_size()).map(|seat| self.study().person(plan.code.group.person(seat, self.study().group_size()))));
+        let persons = persons.map(Iterator::collect::<Vec<_>>);
+        let scene = self.study().trial_scene(plan, persons.as_deref().map_or(Players::People, Players::Modelled))?;
+        let path = folder.join("scene.toml");
+        let is_planned = fs::read_to_string(&path).map_err(StudyError::file("read", &path))? == scene.text;
+        let other = (!is_planned).then(|| "scene.toml is not the scene of this trial".to_owned());
+        Ok(replayed.into_iter().chain(other).map(of_trial).collect())
+    }
+}
+
+/// Returns the first difference of a table in words: the line of comma-separated values, or that there is one.
+fn first_difference(format: Format, found: &[u8], expected: &[u8]) -> String {
+    const OTHER: &str = "not the table of the kept trials and answers";
+    if format == Format::Parquet {
+        return OTHER.to_owned();
+    }
+    let (found, expected) = (String::from_utf8_lossy(found), String::from_utf8_lossy(expected));
+    let pairs = found.lines().map(Some).chain(std::iter::repeat(None)).zip(expected.lines().map(Some).chain(std::iter::repeat(None)));
+    let differing = pairs.take(found.lines().count().max(expected.lines().count())).enumerate().find(|(_, (found, expected))| found != expected);
+    differing.map_or_else(
+        || OTHER.to_owned(),
+        |(line, (found, expected))| format!("line {}: {} in place of {}", line + 1, found.unwrap_or("nothing"), expected.unwrap_or("nothing")),
+    )
+}
