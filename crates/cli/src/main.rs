@@ -46,6 +46,7 @@ mod run;
 mod shard;
 mod shell;
 mod stability;
+mod study;
 mod texts;
 mod variants;
 
@@ -79,6 +80,7 @@ fn main() -> ExitCode {
         Command::Admittance(arguments) => admittance::admittance(&arguments),
         Command::Live(arguments) => live::live(&arguments),
         Command::Play(arguments) => play::play(&arguments),
+        Command::Study(arguments) => study::study(&arguments),
         Command::Relay(arguments) => relay::relay(&arguments),
         Command::Router(arguments) => router::router(&arguments),
         Command::Tokio(arguments) => facade::tokio(&arguments),

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::Command;
 use clap_mangen::Man;
+use cohaptic_linkfile::schema::json_schema;
 use cohaptic_scene::schema::FileSchema;
 
 use crate::arguments::{Arguments, FileKind, ManArguments, SchemaArguments};
@@ -14,12 +15,13 @@ use crate::output;
 
 /// Prints the JSON Schema of a kind of file.
 pub(crate) fn schema(arguments: &SchemaArguments) -> Result<ExitCode, Failure> {
-    let kind = match arguments.kind {
-        FileKind::Scene => FileSchema::Scene,
-        FileKind::Relay => FileSchema::Relay,
-        FileKind::Router => FileSchema::Router,
+    let schema = match arguments.kind {
+        FileKind::Scene => FileSchema::Scene.json(),
+        FileKind::Relay => FileSchema::Relay.json(),
+        FileKind::Router => FileSchema::Router.json(),
+        FileKind::Study => json_schema(&cohaptic_study::ROOT, "cohaptic study file"),
     };
-    output::raw(format!("{}\n", kind.json()).as_bytes())?;
+    output::raw(format!("{schema}\n").as_bytes())?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -15,7 +15,7 @@ pub(crate) struct Observation {
     pub(crate) condition: usize,
     /// Number of the trial in its condition, from 1.
     pub(crate) trial: usize,
-    /// Whether the task timed out.
+    /// `true` if the task timed out.
     pub(crate) timed_out: bool,
     /// Values of the measures, indexed by measure.
     pub(crate) values: Vec<Option<f64>>,
@@ -110,7 +110,7 @@ pub(crate) const TIMED_OUT: &str = "timed-out";
 
 fn measure(study: &Study, units: usize, observations: &[Observation], place: usize, name: &str) -> Analysed {
     let value_of = |observation: &Observation| {
-        let counts_as = (name == TIME && observation.timed_out).then(|| study.limit.as_secs_f64());
+        let counts_as = (name == TIME && observation.timed_out).then_some(study.limit.as_secs_f64());
         observation.values[place].or(counts_as)
     };
     let of = |condition: usize, wanted: &dyn Fn(&Observation) -> bool| -> Vec<f64> {

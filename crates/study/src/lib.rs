@@ -1,9 +1,9 @@
 //! Studies with people: conditions in balanced orders, sessions, records that survive a crash, tables, statistics and a report.
 //!
-//! Use this crate if you run an experiment in which people hold one object together, or if you want to know beforehand how many people it needs.
+//! Use this crate if you run an experiment in which people hold one object together, or if you plan the number of its people.
 //!
 //! A [`Study`] is a scene, keys of the scene that differ between conditions, people in groups, trials and questions. A [`Sequence`] is the session of one
-//! group: which trial, which questions or which break comes next. Its trials are scenes with a seed of their own ([`Study::trial_scene`]). People move the
+//! group: the order of trials, questions and breaks. A trial is a scene with a seed of its own ([`Study::trial_scene`]). People move the
 //! hands of a trial in a live session, and modelled persons in a dry run.
 //!
 //! The crate prints nothing, reads no clock and knows no browser.
@@ -19,6 +19,7 @@
 //! assert_eq!((plan.code.to_string(), plan.practice, plan.of), ("G01-001".to_owned(), true, 28));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+#![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact values"))]
 
 mod analysis;
 mod codes;
@@ -34,6 +35,7 @@ mod statistics;
 mod tables;
 #[cfg(test)]
 mod testing;
+mod text_table;
 mod trial;
 mod written;
 

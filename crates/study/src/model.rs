@@ -103,13 +103,13 @@ pub struct Condition {
 pub struct Question {
     /// Name in the table of answers.
     pub name: String,
-    /// When the question is asked.
+    /// Point of the session at which the question is asked.
     pub after: After,
     /// Form of the answer.
     pub kind: QuestionKind,
 }
 
-/// When a question is asked.
+/// Point of the session at which a question is asked.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum After {

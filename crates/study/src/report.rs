@@ -2,6 +2,7 @@
 
 use cohaptic_picture::page::{Html, Page, Table};
 use cohaptic_picture::{Axis, Fill, Line, Look, Marker, Panel, Picture, Region};
+use cohaptic_scene::{Measure, Scope};
 use cohaptic_units::print::{Counted, SixDigits};
 
 use crate::analysis::{Analysed, Analysis};
@@ -9,6 +10,7 @@ use crate::folder::StudyFolder;
 use crate::model::{Order, Study};
 use crate::statistics::LEAST_UNITS;
 use crate::tables::KeptTrial;
+use crate::text_table;
 
 /// Half of the height of the bar of an interval, in rows.
 const HALF_BAR: f64 = 0.16;
@@ -26,9 +28,8 @@ const NOTES: [&str; 6] = [
 
 impl StudyFolder {
     /// Returns the report as a page. The bytes depend on what is kept alone.
-    pub(crate) fn report(&self, trials: &[KeptTrial]) -> String {
+    pub(crate) fn report(&self, trials: &[KeptTrial], analysis: &Analysis) -> String {
         let study = self.study();
-        let analysis = self.analysis_of(trials);
         let mut page = Page::new(study.title.clone());
         if self.is_dry() {
             page = page.with(Html::warning("A dry run: modelled persons played, and answers were drawn evenly. Nothing here is about people."));
@@ -67,6 +68,27 @@ impl StudyFolder {
 }
 
 impl Analysis {
+    /// Returns the pictures of all measures and questions, each with its name.
+    pub(crate) fn pictures<'a>(&'a self, study: &'a Study) -> impl Iterator<Item = (&'a str, Picture)> {
+        let drawn = self.measures.iter().chain(&self.questions).filter(|measure| !measure.rows.is_empty());
+        // The name of a question ends in a description.
+        drawn.map(|measure| (measure.name.split(' ').next().unwrap_or_default(), picture(study, measure)))
+    }
+
+    /// Returns the means of all measures and questions as lines of text, a line per condition below the names of the columns.
+    #[must_use]
+    pub fn mean_lines(&self, study: &Study) -> Vec<String> {
+        let head = ["measure", "condition", "mean ± interval", "timed out"].map(str::to_owned);
+        let rows = self.measures.iter().chain(&self.questions).flat_map(|measure| {
+            measure.means.iter().zip(&study.conditions).enumerate().map(|(place, (mean, condition))| {
+                let timed_out = measure.timed_out.get(place).copied().flatten().filter(|share| share.count > 0);
+                let timed_out = timed_out.map(|share| format!("{} of {}", share.count, share.of)).unwrap_or_default();
+                [measure.name.clone(), condition.label.clone(), with_interval(mean.mean, mean.half_width), timed_out]
+            })
+        });
+        text_table::lines(&std::iter::once(head).chain(rows).collect::<Vec<_>>())
+    }
+
     /// Returns what a reader must know before any number, in sentences.
     #[must_use]
     pub fn warnings(&self, study: &Study) -> Vec<String> {
@@ -119,6 +141,9 @@ fn conditions(study: &Study) -> Html {
 /// Returns the section of a measure or of a question.
 fn section(study: &Study, measure: &Analysed) -> Html {
     let mut content = Html::heading(3, measure.name.as_str());
+    if let Some(about) = about(&measure.name) {
+        content = content.and(Html::paragraph(about));
+    }
     if measure.left_out > 0 {
         let said = format!("{} without a value in some condition left out.", Counted(measure.left_out, "group"));
         content = content.and(Html::paragraph(said));
@@ -128,6 +153,13 @@ fn section(study: &Study, measure: &Analysed) -> Html {
     }
     content = content.and(Html::figure("", Html::picture(&picture(study, measure).svg())));
     Html::section(&measure.name, content.and(figures(study, measure)))
+}
+
+/// Returns the description of a measure; `None` for a question.
+fn about(name: &str) -> Option<String> {
+    let of_peer = name.strip_prefix("peers.").and_then(|rest| rest.rsplit_once('.')).map(|(_, name)| name);
+    let is_it = |measure: &&Measure| measure.name() == of_peer.unwrap_or(name) && (measure.scope() == Scope::Peer) == of_peer.is_some();
+    Measure::ALL.iter().find(is_it).map(|measure| format!("{}.", measure.about()))
 }
 
 /// Returns the table of means and differences.
@@ -190,10 +222,12 @@ fn picture(study: &Study, measure: &Analysed) -> Picture {
         return picture;
     }
     let curves = measure.curves.iter().zip(&study.conditions).enumerate().map(|(condition, (curve, about))| {
-        let points = curve.iter().enumerate().map(|(trial, value)| (place(trial + 1), *value));
+        let points = curve.iter().enumerate().map(|(trial, value)| (place(trial), *value));
         Line::new(points, Look::of(condition)).named(about.label.as_str()).marked(Marker::of(condition))
     });
-    picture.panel(Panel::new(Axis::new("trial"), Axis::new(measure.name.as_str())).titled("Means over trials").with_all(curves))
+    let numbers: Vec<String> = (1..=study.trials).map(|trial| trial.to_string()).collect();
+    let trials = Axis::new("trial").categories(numbers.iter().map(String::as_str));
+    picture.panel(Panel::new(trials, Axis::new(measure.name.as_str())).titled("Means over trials").with_all(curves))
 }
 
 fn place(number: usize) -> f64 {

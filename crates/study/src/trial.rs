@@ -9,7 +9,7 @@ use cohaptic_scene::{Scene, scene_text};
 use crate::model::{Person, Study};
 use crate::sequence::TrialPlan;
 
-/// Who moves the hands of a trial.
+/// Persons at the hands of a trial.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Players<'a> {
     /// People: the hands are pointers.

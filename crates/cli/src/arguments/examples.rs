@@ -106,6 +106,15 @@ pub(super) const LIVE: &[&str] = &[
 pub(super) const PLAY: &[&str] =
     &["cohaptic play", "cohaptic play scene.toml --set link.delay=60ms --out played", "cohaptic play --control 0.0.0.0:8080 --allow-remote"];
 
+pub(super) const STUDY: &[&str] =
+    &["cohaptic study run studies/pull/study.toml --dry-run --out dry", "cohaptic study verify dry", "cohaptic study forget P07 dry"];
+
+pub(super) const STUDY_RUN: &[&str] = &["cohaptic study run studies/pull/study.toml --dry-run --times 100 --out dry"];
+
+pub(super) const STUDY_FOLDER: &[&str] = &["cohaptic study report dry", "cohaptic study verify dry"];
+
+pub(super) const STUDY_FORGET: &[&str] = &["cohaptic study forget P07 dry"];
+
 pub(super) const RELAY: &[&str] = &[
     "cohaptic relay --listen 127.0.0.1:7000 --to 127.0.0.1:9000 delay 24ms 2ms loss 1%",
     "cohaptic relay --listen 127.0.0.1:7000 --to 127.0.0.1:9000 delay=24ms --back delay=40ms loss=1%",

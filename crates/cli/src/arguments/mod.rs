@@ -13,6 +13,7 @@ mod realtime;
 mod scenes;
 mod shards;
 mod stability;
+mod study;
 #[cfg(test)]
 mod tests;
 
@@ -35,6 +36,7 @@ pub(crate) use shards::{ShardArguments, ShardName};
 pub(crate) use stability::{
     AdmittanceArguments, BoundaryArguments, GridSize, LinksName, MapArguments, PointArguments, RestName, StabilityArguments, StabilityCommand,
 };
+pub(crate) use study::{StudyArguments, StudyCommand, StudyFolderArguments, StudyForgetArguments, StudyRunArguments};
 
 /// Several people feel and move one virtual object together, over a bad network.
 ///
@@ -69,6 +71,8 @@ pub(crate) enum Command {
     Live(LiveArguments),
     /// Opens a page on which people pull the object by mouse, finger or stick, and see what the network does to it
     Play(PlayArguments),
+    /// Runs a study with people in groups: conditions in balanced orders, questions, tables and a report; or a dry run, with its power
+    Study(StudyArguments),
     /// Puts the emulator between programs that speak UDP to each other
     Relay(RelayArguments),
     /// Puts the emulator between two network devices: any IP traffic
@@ -87,7 +91,7 @@ pub(crate) enum Command {
     Paper(PaperArguments),
     /// Writes a scene to begin with, in which every key is explained
     Init(InitArguments),
-    /// Prints a JSON Schema of scenes, relay files or router files: names, meanings, units and defaults of all keys, for editors
+    /// Prints a JSON Schema of scenes, relay files, router files or study files: names, meanings, units and defaults of all keys, for editors
     Schema(SchemaArguments),
     /// Prints completions for a shell
     Completions(CompletionsArguments),

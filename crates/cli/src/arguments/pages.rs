@@ -45,6 +45,8 @@ pub(crate) enum FileKind {
     Relay,
     /// Router files: for router
     Router,
+    /// Study files: for study
+    Study,
 }
 
 #[derive(Debug, Args)]

@@ -12,7 +12,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Commands for scenes", &["init", "run", "check", "explain", "campaign", "compare"]),
     ("Commands for analysis", &["stability", "admittance", "paper"]),
     ("Commands for networks", &["link", "fit", "relay", "router", "tokio", "test"]),
-    ("Commands for people and devices", &["play", "live", "falcon"]),
+    ("Commands for people and devices", &["play", "study", "live", "falcon"]),
     ("Commands for other programs", &["schema", "completions", "man"]),
 ];
 
@@ -30,7 +30,7 @@ impl Arguments {
     /// Parses arguments as the user typed them. The first word is the name of the program.
     pub(crate) fn of(words: impl IntoIterator<Item = OsString>) -> Result<Self, clap::Error> {
         let mut program = Self::program();
-        let matches = program.try_get_matches_from_mut(with_point(words.into_iter().collect()))?;
+        let matches = program.try_get_matches_from_mut(with_command_of_file(words.into_iter().collect()))?;
         Self::from_arg_matches(&matches).map_err(|error| error.format(&mut program))
     }
 }
@@ -66,14 +66,20 @@ fn group(program: &Command, title: &str, names: &[&str]) -> String {
     text
 }
 
-/// Inserts `point` into `stability FILE`, which stands for `stability point FILE`. A word that names no file stays as the command, so that the error message
-/// for a mistyped command speaks of a command and not of a file.
-fn with_point(mut words: Vec<OsString>) -> Vec<OsString> {
+/// Commands of commands that a file alone stands for: `stability FILE` is `stability point FILE`, and `study FILE` is `study run FILE`.
+const OF_FILES: [(&str, &str); 2] = [("stability", "point"), ("study", "run")];
+
+/// Inserts the command of [`OF_FILES`] before a file. A word that names no file stays as the command, so that the error message for a mistyped command speaks
+/// of a command and not of a file.
+fn with_command_of_file(mut words: Vec<OsString>) -> Vec<OsString> {
     let is_option = |word: &OsString| word.to_string_lossy().starts_with('-');
     let Some(place) = (1..words.len()).find(|place| !is_option(&words[*place])) else { return words };
     let is_file = |word: &OsString| word == "-" || word.to_string_lossy().ends_with(".toml") || Path::new(word).is_file();
-    if words[place] == "stability" && words.get(place + 1).is_some_and(is_file) {
-        words.insert(place + 1, "point".into());
+    let inner = OF_FILES.iter().find(|(command, _)| words[place] == *command);
+    if let Some((_, inner)) = inner
+        && words.get(place + 1).is_some_and(is_file)
+    {
+        words.insert(place + 1, inner.into());
     }
     words
 }

@@ -39,7 +39,7 @@ impl Folder {
         let wrapper = folder.path("bin/cohaptic");
         fs::write(&wrapper, WRAPPER).unwrap();
         fs::set_permissions(&wrapper, fs::Permissions::from_mode(0o755)).unwrap();
-        for (name, of) in [("scenarios", "scenarios"), ("docs", "docs"), ("programs", "crates/cli/tests/pages/programs")] {
+        for (name, of) in [("scenarios", "scenarios"), ("studies", "studies"), ("docs", "docs"), ("programs", "crates/cli/tests/pages/programs")] {
             symlink(root().join(of), folder.path("desk").join(name)).unwrap();
         }
         folder

@@ -1,6 +1,6 @@
 //! Every command line on the pages of this project runs here, and prints what the page shows.
 //!
-//! A page is read from its first line to its last, in a folder of its own in which `scenarios` and `docs` are those of the project,
+//! A page is read from its first line to its last, in a folder of its own in which `scenarios`, `studies` and `docs` are those of the project,
 //! and with an empty home; `programs` is the folder here, with what readers do not see. What counts:
 //!
 //! | on the page | is |
@@ -95,6 +95,8 @@ pages! {
     hard_cases: "docs/hard-cases.md",
     live: "docs/live.md",
     play: "docs/play.md",
+    study: "docs/study.md",
+    how_to_study: "docs/how-to-study.md",
     live_control: "docs/live-control.md",
     measured_cluster: "docs/measured-cluster.md",
     measured_router: "docs/measured-router.md",

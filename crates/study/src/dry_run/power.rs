@@ -1,4 +1,4 @@
-//! Power: how often a study of this size finds each difference, by repeated dry runs.
+//! Power of a study: the share of dry runs in which each difference is found.
 
 use std::fs;
 use std::io::Write as _;
@@ -21,6 +21,7 @@ use crate::folder::StudyFolder;
 use crate::model::{Person, Study};
 use crate::report::short;
 use crate::sequence::{Event, Sequence, Step, TrialPlan};
+use crate::text_table;
 use crate::trial::Players;
 
 /// Level below which a p counts as a found difference.
@@ -29,7 +30,7 @@ const LEVEL: f64 = 0.05;
 /// Name of the folder of further runs.
 const RUNS: &str = "dry-runs";
 
-/// Power of a study: how often its differences are found.
+/// Power of a study, for each difference.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Power {
     /// Number of dry runs.
@@ -38,7 +39,7 @@ pub struct Power {
     pub differences: Vec<DifferencePower>,
 }
 
-/// How often a difference to the first condition is found.
+/// Shares of dry runs in which a difference to the first condition is found.
 #[derive(Clone, PartialEq, Debug)]
 pub struct DifferencePower {
     /// Name of the measure.
@@ -53,7 +54,7 @@ pub struct DifferencePower {
     pub corrected: Share,
 }
 
-/// Figures of a dry run, as they are kept.
+/// Figures of a dry run, in the form of their file.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Run {
@@ -96,7 +97,7 @@ impl StudyFolder {
     }
 }
 
-/// Returns a further run: the kept figures, or those of a new run, which are kept then. `None` if the watch stopped the run.
+/// Returns a further run: the kept figures, or the figures of a new run, which are then kept. `None` if the watch stopped the run.
 fn run_of(study: &Study, number: u64, path: &Path, watch: &dyn Watch) -> Result<Option<Run>, StudyError> {
     if path.exists() {
         let text = read_text(path).map_err(StudyError::file("read", path))?;
@@ -111,7 +112,7 @@ fn run_of(study: &Study, number: u64, path: &Path, watch: &dyn Watch) -> Result<
     Ok(Some(run))
 }
 
-/// Plays the analysed trials of all groups, and analyses them. Practice is left out: a modelled person of the next trial has learnt nothing from it.
+/// Plays the analysed trials of all groups, and analyses them. Practice is left out, because a modelled person learns nothing from trial to trial.
 pub(super) fn analysis_of(study: &Study, watch: &dyn Watch) -> Result<Option<Analysis>, StudyError> {
     let mut trials: Vec<(usize, TrialPlan, Vec<Person>)> = Vec::new();
     for unit in 0..study.groups {
@@ -167,11 +168,5 @@ pub fn power_lines(study: &Study, power: &Power) -> Vec<String> {
         [difference.measure.clone(), condition, short(difference.mean), share(difference.alone), share(difference.corrected)]
     });
     let rows: Vec<[String; 5]> = std::iter::once(head).chain(rows).collect();
-    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-    let widths: [usize; 5] = core::array::from_fn(width);
-    let line = |row: &[String; 5]| {
-        let cells = row.iter().zip(widths).map(|(cell, width)| format!("{cell:width$}"));
-        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
-    };
-    rows.iter().map(line).collect()
+    text_table::lines(&rows)
 }

@@ -1,4 +1,4 @@
-//! `study.json`: the study file and the files that it names, as they were at the beginning of the study.
+//! `study.json`: texts of the study file and of the files named there, as of the beginning of the study.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -11,13 +11,13 @@ use serde::{Deserialize, Serialize};
 use crate::error::StudyError;
 use crate::model::Study;
 
-/// Texts of a study. Names are those written in the study file: a path of the machine would name its user.
+/// Texts of a study. Files have the names of the study file, because a path of the machine can contain the name of a person.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct KeptStudy {
     /// Name of the study file, without its folder.
     file: String,
-    /// Whether modelled persons play.
+    /// `true` if modelled persons play.
     dry_run: bool,
     /// Text of the study file.
     study: String,

@@ -1,22 +1,23 @@
-//! The folder of a study: what is kept of each session, in the order in which it happens.
+//! The folder of a study: sessions and trials, kept in the order of their events.
 //!
 //! ```text
 //! cohaptic.lock                   held while a process works on the folder
-//! study.json                      the study file and the files that it names, as they were at the beginning
-//! groups/G01.jsonl                the session of a group: its row and its events, a line each
+//! study.json                      texts of the study file and of the files named there, as of the beginning
+//! groups/G01.jsonl                session of a group: the row of its order, and an event per line
 //! trials/G01-012/scene.toml       the scene of a trial
-//! trials/G01-012/inputs.csv       the inputs of its hands
-//! trials/G01-012/trial.json       what the trial gave, and how well it ran
+//! trials/G01-012/inputs.csv       inputs of the hands
+//! trials/G01-012/trial.json       outcome, measures, and faults
 //! staging/                        the trial under way
 //! trials.csv, trials.parquet      the table of trials
 //! answers.csv, answers.parquet    the table of answers
 //! report.html                     the report
+//! pictures/task_time_s.svg        picture of a measure, or of a question
 //! ```
 //!
 //! Nothing is kept of a person but codes, motion and answers: no name, no address, and no time of day.
 //!
-//! A trial gets its folder, and an event its line, only when all of its bytes are on the disk. A process that is killed leaves a session that continues at the
-//! first thing not kept. A trial whose folder has its name counts, even if the process was killed before the line of its event was written.
+//! A trial gets its final name, and an event its line, when all bytes are on the disk. After a crash a session continues at the first trial, answer or break
+//! that is not kept. A trial with its final name counts, even if the process was killed before the event of the trial was written.
 
 mod group;
 mod kept_study;
@@ -51,7 +52,7 @@ pub struct StudyFolder {
     study: Study,
     /// Name and version of the program, for the tables.
     program: String,
-    /// Whether modelled persons play.
+    /// `true` if modelled persons play.
     is_dry: bool,
     /// Sessions, indexed by [`GroupCode::index`].
     groups: Vec<Group>,
@@ -64,7 +65,7 @@ impl StudyFolder {
     ///
     /// # Errors
     ///
-    /// [`StudyError`] if the folder holds something else or another study, if another process works on it, or if it cannot be read or written.
+    /// [`StudyError`] if the folder holds foreign files or another study, if another process works on the folder, or if a file cannot be read or written.
     pub fn open(study: Study, path: &Path, program: &str) -> Result<Self, StudyError> {
         Self::begin(study, path, program, false)
     }
@@ -90,7 +91,7 @@ impl StudyFolder {
     ///
     /// # Errors
     ///
-    /// [`StudyError::NoStudy`] if there is none, and otherwise as [`StudyFolder::open`].
+    /// [`StudyError::NoStudy`] for a folder without a study; otherwise as [`StudyFolder::open`].
     pub fn of_folder(path: &Path, program: &str) -> Result<Self, StudyError> {
         let file = path.join(STUDY);
         if !file.exists() {
@@ -116,7 +117,7 @@ impl StudyFolder {
                 return Ok(true);
             }
             let name = name.to_string_lossy().into_owned();
-            // A study killed before its first file had its name leaves such files.
+            // A process killed while it began the study leaves a lock and a partial file.
             if name != FOLDER_LOCK && !name.ends_with(PARTIAL) {
                 others.push(name);
             }
@@ -129,17 +130,18 @@ impl StudyFolder {
     }
 
     fn taken(path: &Path) -> Result<OwnFolder, StudyError> {
-        OwnFolder::take(path).map_err(|error| match error.kind() {
-            ErrorKind::ResourceBusy => StudyError::Busy { path: path.to_path_buf() },
-            _ => StudyError::file("make the folder", path)(error),
+        OwnFolder::take(path).map_err(|error| {
+            let is_busy = error.kind() == ErrorKind::ResourceBusy;
+            if is_busy { StudyError::Busy { path: path.to_path_buf() } } else { StudyError::file("make the folder", path)(error) }
         })
     }
 
-    /// Reads the sessions. A trial with its final name whose event was not written counts, and trials of forgotten groups are removed.
+    /// Reads the sessions. A trial with its final name counts without its event too, and trials of forgotten groups are removed.
     fn with_groups(mut self) -> Result<Self, StudyError> {
         let folder = self.path.join(GROUPS);
-        self.make_folder(&folder)?;
-        self.make_folder(&self.path.join(TRIALS))?;
+        for path in [&folder, &self.path.join(TRIALS)] {
+            fs::create_dir_all(path).map_err(StudyError::file("make the folder", path))?;
+        }
         let mut codes: Vec<GroupCode> = names(&folder)?.iter().filter_map(|name| name.strip_suffix(".jsonl")?.parse().ok()).collect();
         codes.sort_unstable();
         for (index, code) in codes.into_iter().enumerate() {
@@ -165,7 +167,7 @@ impl StudyFolder {
         Ok(self)
     }
 
-    /// Returns the session of the next group if its first trial is kept and its file is not yet.
+    /// Returns the session of the next group if the first trial is kept and the file of the session is not written yet.
     fn begun_by_its_trial(&self) -> Result<Option<Group>, StudyError> {
         let Some(mut session) = self.new_group() else { return Ok(None) };
         let Step::Trial(plan) = session.step() else { return Ok(None) };
@@ -178,7 +180,7 @@ impl StudyFolder {
         Ok(Some(group))
     }
 
-    /// Removes folders of trials that no session has: those of forgotten persons.
+    /// Removes folders of trials without a session: the trials of forgotten persons.
     fn sweep(&self) -> Result<(), StudyError> {
         let folder = self.path.join(TRIALS);
         for name in names(&folder)? {
@@ -222,8 +224,8 @@ impl StudyFolder {
         self.groups.iter().filter(|group| group.is_done()).count()
     }
 
-    /// Returns the session to run next: the session that was begun and has not ended, at the first thing that is not kept; otherwise a new one; `None` if the
-    /// study is full. Nothing of a new session is on the disk before its first trial.
+    /// Returns the session to run next: the session under way, at the first event that is not kept, or else a new session; `None` if the study is full.
+    /// Nothing of a new session is on the disk before the first trial is kept.
     #[must_use]
     pub fn next_group(&self) -> Option<Sequence> {
         self.groups.iter().find_map(Group::running).cloned().or_else(|| self.new_group())
@@ -238,6 +240,12 @@ impl StudyFolder {
         (0..self.study.groups).find(|slot| !self.groups.iter().any(|group| group.slot == *slot && (group.is_done() || group.running().is_some())))
     }
 
+    /// Returns the number of kept trials, those of abandoned sessions included.
+    #[must_use]
+    pub fn trials(&self) -> usize {
+        self.groups.iter().map(|group| group.ended().len()).sum()
+    }
+
     pub(crate) fn groups(&self) -> &[Group] {
         &self.groups
     }
@@ -246,7 +254,7 @@ impl StudyFolder {
         &self.program
     }
 
-    /// Empties the folder of the trial under way, and returns its path. The trial is recorded there as `scene.toml`, the text of
+    /// Empties the folder of the trial under way, and returns the path. The caller records the trial as `scene.toml`, the text of
     /// [`TrialScene`](crate::TrialScene), and `inputs.csv`.
     ///
     /// # Errors
@@ -262,7 +270,7 @@ impl StudyFolder {
         Ok(path)
     }
 
-    /// Keeps the trial in the folder of [`StudyFolder::staging`] as the next trial of the session. The trial is replayed, and its measures are kept too.
+    /// Keeps the trial in the folder of [`StudyFolder::staging`] as the next trial of the session. The measures of a replay are kept with the trial.
     ///
     /// # Errors
     ///
@@ -270,7 +278,7 @@ impl StudyFolder {
     pub fn keep_trial(&mut self, session: &mut Sequence, facts: TrialFacts) -> Result<TrialRecord, StudyError> {
         let mut next = session.clone();
         let Step::Trial(plan) = session.step() else {
-            // Refused by the session, with its own words.
+            // The session refuses the event, with the reason.
             next.handle(Event::TrialEnded { faults: Vec::new() })?;
             return Err(StudyError::Refused(SequenceError::Ended));
         };
@@ -289,7 +297,7 @@ impl StudyFolder {
         Ok(record)
     }
 
-    /// Keeps an event of a session that is no trial: an answer, the end of a break, a repetition, the end.
+    /// Keeps an event other than a trial: an answer, the end of a break, a repetition, or the end.
     ///
     /// # Errors
     ///
@@ -318,9 +326,9 @@ impl StudyFolder {
         Ok(())
     }
 
-    /// Replaces a session, and removes the trials that the new one does not have.
+    /// Replaces a session, and removes all trials missing from the new session.
     pub(crate) fn replace(&mut self, group: Group) -> Result<(), StudyError> {
-        // The file of the session first: from then on its trials belong to nobody, and are removed also after a crash.
+        // The file of the session comes first: the trials then belong to no session, and are removed also after a crash.
         self.put_group(group)?;
         self.sweep()?;
         // A trial under way may be of this group.
@@ -336,13 +344,9 @@ impl StudyFolder {
     pub(crate) fn trial(&self, code: TrialCode) -> PathBuf {
         self.path.join(TRIALS).join(code.to_string())
     }
-
-    fn make_folder(&self, path: &Path) -> Result<(), StudyError> {
-        fs::create_dir_all(path).map_err(StudyError::file("make the folder", path))
-    }
 }
 
-/// Returns the names in a folder, in order. Names that are no text are left out.
+/// Returns the names in a folder, in order. Names without a Unicode form are left out.
 fn names(folder: &Path) -> Result<Vec<String>, StudyError> {
     let read = || -> std::io::Result<Vec<String>> {
         let mut names = Vec::new();

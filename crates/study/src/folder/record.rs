@@ -1,4 +1,4 @@
-//! `trial.json`: what a trial gave, and how well it ran. The measures come from the replay of its scene and its inputs.
+//! `trial.json`: outcome, measures and faults of a trial. The measures come from a replay of scene and inputs.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -13,7 +13,7 @@ use crate::codes::TrialCode;
 use crate::error::StudyError;
 use crate::sequence::Fault;
 
-/// How well a trial ran.
+/// Quality of a trial: faults, late ticks and round trips.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct TrialFacts {
     /// Reasons for which the trial is not valid; empty for a valid trial.
@@ -24,7 +24,7 @@ pub struct TrialFacts {
     pub round_trips: Vec<Option<RoundTrip>>,
 }
 
-/// Round trips to a browser. They add to the delay of the scene.
+/// Round trips to a browser, which add to the delay of the scene.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RoundTrip {
@@ -34,13 +34,13 @@ pub struct RoundTrip {
     pub p99_s: f64,
 }
 
-/// What is kept of a trial beside its scene and its inputs.
+/// Record of a trial, kept beside scene and inputs.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrialRecord {
     /// Code of the trial.
     pub trial: TrialCode,
-    /// Reasons for which the trial was not valid when it ended.
+    /// Reasons for which the trial was not valid at its end.
     pub faults: Vec<Fault>,
     /// Ticks that were late by the clock of the computer.
     pub late_ticks: u64,
@@ -110,7 +110,7 @@ impl TrialRecord {
     }
 }
 
-/// What the replay of a trial gives.
+/// Result of the replay of a trial.
 struct Replayed {
     outcome: String,
     time_s: f64,

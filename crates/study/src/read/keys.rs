@@ -38,7 +38,7 @@ pub(super) static BREAK: Table = Table::of(&[&[
     required("every", Form::Integer(1, 1000), "Number of trials from a break to the next").expecting("a number of trials, {}"),
     usual("at-least", Form::Duration, "\"30s\"", "Least duration of a break"),
 ]]);
-static CONDITIONS: Table = Table::with_others(&[], &Form::List(&Form::AnyOf(&[Form::Text, Form::Boolean])));
+static CONDITIONS: Table = Table::with_others(&[], &Form::List(&Form::AnyOf(&[Form::Text, Form::Boolean, number(Quantity::any(""))])));
 pub(super) static QUESTION: Table = Table::of(&[&[
     optional("name", Form::Text, "Name in the table of answers; the kind and the number of the entry by default"),
     required("after", Form::Words(const { &words(&AFTER) }), "When the question is asked").expecting("trial, condition or study"),

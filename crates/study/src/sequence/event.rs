@@ -1,4 +1,4 @@
-//! Events of a session, in the form in which they are kept.
+//! Events of a session, in the form of the file of the session.
 
 use serde::{Deserialize, Serialize};
 
@@ -69,7 +69,7 @@ pub enum SequenceError {
     /// The session waits for something else.
     #[error("the session waits for {waits_for}")]
     Other {
-        /// What the session waits for.
+        /// Next step of the session, in words.
         waits_for: &'static str,
     },
     /// The session has ended.

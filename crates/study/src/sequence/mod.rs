@@ -1,7 +1,7 @@
-//! Session of one group as a state machine without clock, files and network: which trial, which questions or which break comes next.
+//! Session of a group as a state machine without clock, files and network: trials, questions and breaks, each in turn.
 //!
 //! A session goes through the conditions in the order of its row. Each condition is a block: practice trials, analysed trials, and a repetition of each analysed
-//! trial that was not valid. The questions of the condition follow the block. A repetition that is not valid is not repeated again.
+//! trial without validity. The questions of the condition follow the block. A repetition is never repeated again.
 //!
 //! The events of a session, in their order, make the state again: this is how a session continues after a crash.
 
@@ -31,13 +31,13 @@ pub struct TrialPlan {
     pub condition: usize,
     /// Number of the trial among the practice trials, or among the analysed trials, of its condition, from 1. A repetition has the number of the repeated trial.
     pub trial: usize,
-    /// Whether the trial is for practice, and is never analysed.
+    /// `true` for a trial for practice, which is never analysed.
     pub practice: bool,
-    /// Number in the session of the trial that this trial repeats.
+    /// Number in the session of the repeated trial; `None` for the first run of a trial.
     pub repeats: Option<usize>,
     /// Seed of the scene.
     pub seed: u64,
-    /// Trials of the session that are planned so far, repetitions included.
+    /// Number of planned trials of the session so far, repetitions included.
     pub of: usize,
 }
 
@@ -68,14 +68,14 @@ pub struct GivenAnswer {
     pub values: Vec<u32>,
 }
 
-/// What a session waits for.
+/// Next step of a session.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Step {
     /// A trial is run.
     Trial(TrialPlan),
     /// Each person answers questions.
     Questions {
-        /// When these questions are asked.
+        /// Point of the session at which the questions are asked.
         after: After,
         /// Indices in [`Study::questions`] of the questions without an answer, indexed by seat.
         due: Vec<Vec<usize>>,
@@ -123,7 +123,7 @@ pub struct Sequence {
     events: Vec<Event>,
 }
 
-/// Parts of a study on which the sequence depends.
+/// Parts of a study with an effect on the sequence.
 #[derive(Clone, PartialEq, Eq, Debug)]
 struct Rules {
     seed: u64,
@@ -193,7 +193,7 @@ impl Sequence {
         Ok(session)
     }
 
-    /// Returns what the session waits for.
+    /// Returns the next step.
     #[must_use]
     pub fn step(&self) -> Step {
         match (self.state, self.left.front()) {
@@ -210,7 +210,7 @@ impl Sequence {
     ///
     /// # Errors
     ///
-    /// [`SequenceError`] if the session waits for something else, or if an answer is no answer to its question.
+    /// [`SequenceError`] if the event does not fit the next step, or if the values do not answer the question.
     pub fn handle(&mut self, event: Event) -> Result<(), SequenceError> {
         match &event {
             Event::TrialEnded { faults } => self.end_trial(faults)?,
@@ -332,7 +332,7 @@ impl Sequence {
 
     /// Repeats the last trial at the end of its block.
     fn repeat(&mut self) -> Result<(), SequenceError> {
-        // Answers about the condition are about all of its trials, so that no trial may follow the first of these answers.
+        // An answer about the condition is about all trials of the block, so that no trial may follow the first answer.
         let position = Some(self.block + 1);
         let answered = self.answers.iter().any(|answer| answer.number.is_none() && answer.position == position);
         if matches!(self.state, State::Done | State::Abandoned | State::Questions(After::Study)) || answered {
@@ -409,7 +409,7 @@ impl Sequence {
         if self.state == state { Ok(()) } else { Err(SequenceError::Other { waits_for: self.waits_for() }) }
     }
 
-    /// Returns what the session waits for, in words.
+    /// Returns the next step in words.
     const fn waits_for(&self) -> &'static str {
         match self.state {
             State::Trial => "a trial",

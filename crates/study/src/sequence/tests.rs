@@ -11,7 +11,7 @@ fn session(study: &Study, slot: usize) -> Sequence {
 fn trial(session: &Sequence) -> TrialPlan {
     match session.step() {
         Step::Trial(plan) => plan,
-        other => panic!("{other:?}"),
+        other @ (Step::Questions { .. } | Step::Break { .. } | Step::Done | Step::Abandoned) => panic!("{other:?}"),
     }
 }
 

@@ -1,11 +1,12 @@
-//! What is written from the kept trials and answers, and can be written again: tables and report. Also what compares both, and what removes a person from both.
+//! Tables and report, written from the kept trials and answers; their verification; and the removal of a person.
 
 mod forget;
 #[cfg(test)]
 mod tests;
 mod verify;
 
-use std::io::Write as _;
+use std::fs;
+use std::io::{ErrorKind, Write as _};
 
 use cohaptic_campaign::Format;
 use cohaptic_files::write_whole;
@@ -15,12 +16,15 @@ use crate::folder::StudyFolder;
 
 pub use verify::Verified;
 
+/// Name of the folder with the pictures of the report.
+const PICTURES: &str = "pictures";
+
 impl StudyFolder {
-    /// Writes the tables and the report again, from what is kept.
+    /// Writes the tables, the pictures and the report again, from what is kept.
     ///
     /// # Errors
     ///
-    /// [`StudyError::File`] if a file cannot be read or written, [`StudyError::Damaged`] if the record of a trial is none.
+    /// [`StudyError::File`] if a file cannot be read or written, [`StudyError::Damaged`] for a damaged record of a trial.
     pub fn write_tables(&self) -> Result<(), StudyError> {
         let trials = self.kept_trials()?;
         let whole = |name: &str, bytes: &[u8]| {
@@ -34,6 +38,16 @@ impl StudyFolder {
                 whole(&name, &bytes)?;
             }
         }
-        whole("report.html", self.report(&trials).as_bytes())
+        let pictures = self.path().join(PICTURES);
+        // A study that has lost its last complete session has no pictures any more.
+        match fs::remove_dir_all(&pictures) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(StudyError::file("remove", &pictures)(error)),
+            _ => fs::create_dir_all(&pictures).map_err(StudyError::file("make the folder", &pictures))?,
+        }
+        let analysis = self.analysis_of(&trials);
+        for (name, picture) in analysis.pictures(self.study()) {
+            whole(&format!("{PICTURES}/{name}.svg"), picture.svg().as_bytes())?;
+        }
+        whole("report.html", self.report(&trials, &analysis).as_bytes())
     }
 }

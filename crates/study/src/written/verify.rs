@@ -15,12 +15,12 @@ use crate::trial::Players;
 pub struct Verified {
     /// Number of replayed trials.
     pub trials: usize,
-    /// Differences between what is kept and what the replays give, each with its place, in words.
+    /// Differences between the kept files and the replays in words, each with the name of a file or trial.
     pub differences: Vec<String>,
 }
 
 impl StudyFolder {
-    /// Replays every trial, and compares its measures with its record, its scene with the scene of its plan, and the tables with those of the records.
+    /// Replays every trial, and compares the measures with the record, the scene with the planned scene, and the tables with tables of the records.
     ///
     /// # Errors
     ///
@@ -53,7 +53,7 @@ impl StudyFolder {
         let of_trial = |difference: String| format!("{}: {difference}", plan.code);
         let replayed = match trial.record.differences(&folder) {
             Ok(differences) => differences,
-            // A damaged record or scene is what a verification looks for.
+            // A damaged record or scene is a difference, not a failure of the verification.
             Err(error @ (StudyError::Damaged { .. } | StudyError::Study(_))) => vec![error.to_string()],
             Err(error) => return Err(error),
         };
@@ -69,7 +69,7 @@ impl StudyFolder {
     }
 }
 
-/// Returns the first difference of a table in words: the line of comma-separated values, or that there is one.
+/// Returns the first difference of a table in words, with both lines for comma-separated values.
 fn first_difference(format: Format, found: &[u8], expected: &[u8]) -> String {
     const OTHER: &str = "not the table of the kept trials and answers";
     if format == Format::Parquet {

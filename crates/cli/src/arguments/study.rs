@@ -1,0 +1,66 @@
+//! `study`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use cohaptic_study::PersonCode;
+
+use super::examples::{self, after};
+use super::numbers::{integer, threads};
+
+#[derive(Debug, Args)]
+#[command(after_help = after(examples::STUDY))]
+pub(crate) struct StudyArguments {
+    #[command(subcommand)]
+    pub(crate) command: StudyCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum StudyCommand {
+    /// Runs a study; cohaptic study FILE is short for this
+    Run(StudyRunArguments),
+    /// Writes the tables and the report again, from the kept trials and answers
+    Report(StudyFolderArguments),
+    /// Replays every trial, and compares the measures, the scenes and the tables with what is kept
+    Verify(StudyFolderArguments),
+    /// Removes everything about a person, and writes the tables again
+    Forget(StudyForgetArguments),
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = after(examples::STUDY_RUN))]
+pub(crate) struct StudyRunArguments {
+    /// The study, a TOML file
+    pub(crate) study: PathBuf,
+    /// Let modelled persons play, through the same orders, trials and tables as people
+    #[arg(long, required = true)]
+    pub(crate) dry_run: bool,
+    /// Number of dry runs, each with other persons: says how often each difference is found
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "dry_run", allow_negative_numbers = true, value_parser = integer::<u64>(1, 99_999))]
+    pub(crate) times: u64,
+    /// Folder of the study: trials, answers, tables and report.html. Repeat the command to go on from there
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Number of trials of dry runs made at the same time [default: one per core]. Results do not depend on it
+    #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
+    pub(crate) threads: Option<u16>,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = after(examples::STUDY_FOLDER))]
+pub(crate) struct StudyFolderArguments {
+    /// Folder of the study
+    #[arg(value_name = "DIR")]
+    pub(crate) folder: PathBuf,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = after(examples::STUDY_FORGET))]
+pub(crate) struct StudyForgetArguments {
+    /// Code of the person, such as P07
+    #[arg(value_name = "CODE")]
+    pub(crate) person: PersonCode,
+    /// Folder of the study
+    #[arg(value_name = "DIR")]
+    pub(crate) folder: PathBuf,
+}

@@ -1,0 +1,147 @@
+//! `cohaptic study`: dry runs, reports, verification, and persons who are forgotten.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use cohaptic_study::{Power, Study, StudyError, StudyFolder, Watch, power_lines};
+use cohaptic_units::print::Counted;
+
+use crate::arguments::{StudyArguments, StudyCommand, StudyFolderArguments, StudyForgetArguments, StudyRunArguments};
+use crate::campaign::{PROGRAM, pool};
+use crate::failure::{EXPECTATION, Failure};
+use crate::progress::Progress;
+use crate::{interrupt, output};
+
+/// Largest number of printed differences of a verification.
+const MOST_DIFFERENCES: usize = 50;
+
+/// Does what a command on a study asks for.
+pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitCode, Failure> {
+    match &arguments.command {
+        StudyCommand::Run(arguments) => dry_run(arguments),
+        StudyCommand::Report(arguments) => report(arguments),
+        StudyCommand::Verify(arguments) => verify(arguments),
+        StudyCommand::Forget(arguments) => forget(arguments),
+    }
+}
+
+/// Lets modelled persons play the study, and prints the means and the power.
+fn dry_run(arguments: &StudyRunArguments) -> Result<ExitCode, Failure> {
+    let study = Study::read(&arguments.study)?;
+    let mut folder = StudyFolder::open_dry(study, &arguments.out, PROGRAM).map_err(failure)?;
+    // Each trial is whole on the disk before the next begins, so that the command can be ended at any time.
+    interrupt::has_results();
+    let trials = folder.study().trials_in_all() as u64;
+    let shown = Shown(Progress::through_runs(trials + arguments.times - 1, folder.trials() as u64));
+    let out = output::path(&arguments.out);
+    let go_on = || Failure::Interrupted(format!("what is done is kept in {out}; repeat the command to go on from there"));
+    let done = pool(arguments.threads, || {
+        if !folder.play_dry(&shown)? {
+            return Ok(None);
+        }
+        folder.power(arguments.times, &shown)
+    })?;
+    shown.0.clear();
+    let power = done.map_err(failure)?.ok_or_else(go_on)?;
+    output::text(&words(&folder, &power)?)?;
+    output::wrote(TABLES.map(|name| arguments.out.join(name)));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Names of the written files.
+const TABLES: [&str; 5] = ["trials.csv", "trials.parquet", "answers.csv", "answers.parquet", "report.html"];
+
+/// Returns the answer of a dry run in words.
+fn words(folder: &StudyFolder, power: &Power) -> Result<String, Failure> {
+    let study = folder.study();
+    let analysis = folder.analysis().map_err(failure)?;
+    let mut text = format!(
+        "{}: {} in {}, {} each, played by modelled persons\n",
+        study.title,
+        Counted(study.participants(), "person").to_string().replace("persons", "people"),
+        Counted(study.groups, "group"),
+        Counted(study.conditions.len(), "condition"),
+    );
+    for warning in analysis.warnings(study) {
+        text.push_str(&format!("note: {warning}\n"));
+    }
+    let lines = |lines: Vec<String>| lines.into_iter().map(|line| format!("  {line}\n")).collect::<String>();
+    text.push_str(&format!("\nMeans of the first dry run:\n{}", lines(analysis.mean_lines(study))));
+    text.push_str(&format!("\nHow often the differences are found, in {}:\n{}", Counted(power.times, "dry run"), lines(power_lines(study, power))));
+    Ok(text)
+}
+
+/// Writes the tables and the report again.
+fn report(arguments: &StudyFolderArguments) -> Result<ExitCode, Failure> {
+    let folder = open(&arguments.folder)?;
+    folder.write_tables().map_err(failure)?;
+    let sessions = Counted(folder.study().groups, "session");
+    output::text(&format!("{} of {sessions} are complete\n", folder.complete()))?;
+    output::wrote(TABLES.map(|name| arguments.folder.join(name)));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Replays every trial. Differences give the status of a failed expectation.
+fn verify(arguments: &StudyFolderArguments) -> Result<ExitCode, Failure> {
+    let verified = open(&arguments.folder)?.verify().map_err(failure)?;
+    let trials = Counted(verified.trials, "trial");
+    if verified.differences.is_empty() {
+        output::text(&format!("{trials} replayed: every measure, every scene and every table is as it is kept\n"))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let mut text = format!("{trials} replayed, with {}:\n", Counted(verified.differences.len(), "difference"));
+    for difference in verified.differences.iter().take(MOST_DIFFERENCES) {
+        text.push_str(&format!("  {difference}\n"));
+    }
+    let more = verified.differences.len().saturating_sub(MOST_DIFFERENCES);
+    if more > 0 {
+        text.push_str(&format!("  and {more} more\n"));
+    }
+    output::text(&text)?;
+    Ok(ExitCode::from(EXPECTATION))
+}
+
+/// Removes everything about a person.
+fn forget(arguments: &StudyForgetArguments) -> Result<ExitCode, Failure> {
+    let mut folder = open(&arguments.folder)?;
+    folder.forget(arguments.person).map_err(failure)?;
+    let (group, _) = arguments.person.place(folder.study().group_size());
+    let words = format!(
+        "{} is forgotten: the trials of {group} are removed, because nobody moved alone in them, and the answers of {}. The row of {group} is given again\n",
+        arguments.person, arguments.person
+    );
+    output::text(&words)?;
+    output::wrote(TABLES.map(|name| arguments.folder.join(name)));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn open(folder: &Path) -> Result<StudyFolder, Failure> {
+    StudyFolder::of_folder(folder, PROGRAM).map_err(failure)
+}
+
+/// Returns the failure of an error of a study.
+fn failure(error: StudyError) -> Failure {
+    match error {
+        StudyError::Study(error) => Failure::Scene(error),
+        StudyError::File { verb, path, error } => Failure::File { verb, path, error },
+        error if error.is_io() => Failure::System(error.to_string()),
+        error => Failure::Input(error.to_string()),
+    }
+}
+
+/// Progress of a dry run: a step per kept trial, and per further run.
+struct Shown(Progress);
+
+impl Watch for Shown {
+    fn keep_going(&self) -> bool {
+        !interrupt::requested()
+    }
+
+    fn kept(&self) {
+        self.0.one_more();
+    }
+
+    fn ran(&self) {
+        self.0.one_more();
+    }
+}
