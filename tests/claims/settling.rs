@@ -82,6 +82,11 @@ impl Settling {
             | StateKind::ObjectVelocity { .. }
             | StateKind::PendingCoupling { .. }
             | StateKind::PendingForce { .. }
+            | StateKind::LatestPosition { .. }
+            | StateKind::LatestVelocity { .. }
+            | StateKind::ReadingPosition { .. }
+            | StateKind::ReadingVelocity { .. }
+            | StateKind::KeptCoupling { .. }
             | StateKind::Memory { .. }
             | StateKind::WantedPosition { .. }
             | StateKind::SeenPosition { .. } => 0,
@@ -111,12 +116,17 @@ impl Settling {
             StateKind::SampleVelocity { age, .. } => sample(peer, age).1 * time,
             StateKind::PendingCoupling { .. }
             | StateKind::PendingForce { .. }
+            | StateKind::LatestPosition { .. }
+            | StateKind::LatestVelocity { .. }
+            | StateKind::ReadingPosition { .. }
+            | StateKind::ReadingVelocity { .. }
+            | StateKind::KeptCoupling { .. }
             | StateKind::Memory { .. }
             | StateKind::WantedPosition { .. }
             | StateKind::SeenPosition { .. }
             | StateKind::SampleForce { .. }
             | StateKind::SampleWave { .. } => {
-                unreachable!("no computation delay, nothing remembered, no operator, no server")
+                unreachable!("no computation delay, no slow device, nothing remembered, no operator, no server")
             }
         };
         self.monodromy.states.iter().map(|state| value(state.peer, state.kind).powi(2)).sum::<f64>().sqrt()

@@ -74,7 +74,7 @@ const BASE: &str = r#"
 "#;
 
 /// One thing more than the base has, as keys of the scene. The least model has a part of its own for most of them.
-const ADDITIONS: [&[&str]; 26] = [
+const ADDITIONS: [&[&str]; 27] = [
     &[],
     &["scene.axes=2", "peers.peer1.hand.sine.amplitude=[1.5, 1.0]"],
     &["scene.axes=3", "peers.peer1.hand.sine.amplitude=[1.5, 1.0, 0.5]"],

@@ -64,6 +64,11 @@ fn bodies(monodromy: &Monodromy, draft: &Draft, log: &Log, frame: usize) -> Vec<
             StateKind::ObjectVelocity { axis } => Some(tick.object.velocity[axis] * monodromy.time),
             StateKind::PendingCoupling { .. }
             | StateKind::PendingForce { .. }
+            | StateKind::LatestPosition { .. }
+            | StateKind::LatestVelocity { .. }
+            | StateKind::ReadingPosition { .. }
+            | StateKind::ReadingVelocity { .. }
+            | StateKind::KeptCoupling { .. }
             | StateKind::Memory { .. }
             | StateKind::WantedPosition { .. }
             | StateKind::SeenPosition { .. }
