@@ -139,9 +139,9 @@ pub enum AnalysisError {
     DeadBands,
     /// Clients send displacements over a line that does more than delay all samples alike.
     #[error(
-        "with sends = \"increments\" the server adds displacements, and what {line} loses, repeats or reorders is missing in the sum from then on: its position then \
-         wanders off, and no disturbance of it dies out; expected lines of a constant delay from {peer} to the server, or sends = \"states\"; simulations show \
-         where it wanders, as in `cohaptic run`"
+        "with sends = \"increments\" the server adds displacements, and {line} does more than to delay all of them alike: what gets lost stays missing, so that \
+         the position of {peer} at the server wanders off, and no disturbance of it dies out; expected lines of a constant delay from {peer} to the server, or \
+         sends = \"states\"; simulations show how far it wanders, as in `cohaptic run`"
     )]
     LostIncrements {
         /// The line, in words.
