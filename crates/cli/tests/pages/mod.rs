@@ -145,6 +145,8 @@ pages! {
     tutorial_paper: "docs/tutorial-paper.md",
     tutorial_tray: "docs/tutorial-tray.md",
     wan_crate: "crates/wan/README.md",
+    #[ignore = ".ci/nightly runs it: it takes long"]
+    which_coordination: "docs/which-coordination.md",
 }
 
 fn root() -> PathBuf {
