@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, OnceLock};
 
 use cohaptic_control::fuzzing::Site;
-use cohaptic_control::{Board, Description, Kind, LinkEditor, LinkName, Role, Stage, StageFile};
+use cohaptic_control::{Board, Description, Hands, Kind, LinkEditor, LinkName, Role, Stage, StageFile};
 use serde_json::{Value, json};
 
 use crate::Input;
@@ -36,11 +36,7 @@ impl LinkEditor for Editor {
 /// A run in which nobody takes part.
 struct Nobody;
 
-impl Stage for Nobody {
-    fn facts(&self, role: Role) -> Value {
-        json!({ "host": role == Role::Host })
-    }
-
+impl Hands for Nobody {
     fn frame(&self) -> (u64, Arc<str>) {
         (0, "".into())
     }
@@ -54,6 +50,12 @@ impl Stage for Nobody {
     }
 
     fn leave_hand(&self, _: usize) {}
+}
+
+impl Stage for Nobody {
+    fn facts(&self, role: Role) -> Value {
+        json!({ "host": role == Role::Host })
+    }
 
     fn begin_anew(&self, wish: &Value) -> Result<(), String> {
         if wish.is_object() { Ok(()) } else { Err("expected an object".to_owned()) }

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, OnceLock};
 
 use cohaptic_control::fuzzing::Site;
-use cohaptic_control::{Board, Description, Kind, LinkEditor, Role, Stage, StageFile};
+use cohaptic_control::{Board, Description, Hands, Kind, LinkEditor, Role, Stage, StageFile};
 use serde_json::Value;
 
 use crate::Input;
@@ -20,11 +20,7 @@ struct Told {
 /// Writes down what it is told.
 struct Recorder(Arc<Mutex<Told>>);
 
-impl Stage for Recorder {
-    fn facts(&self, _: Role) -> Value {
-        Value::Null
-    }
-
+impl Hands for Recorder {
     fn frame(&self) -> (u64, Arc<str>) {
         (0, "".into())
     }
@@ -42,6 +38,12 @@ impl Stage for Recorder {
     fn leave_hand(&self, hand: usize) {
         assert_eq!(hand, HAND);
         self.0.lock().unwrap().left += 1;
+    }
+}
+
+impl Stage for Recorder {
+    fn facts(&self, _: Role) -> Value {
+        Value::Null
     }
 
     fn begin_anew(&self, _: &Value) -> Result<(), String> {

@@ -1,6 +1,9 @@
 // The page left its token in the tab before it took it out of the address. A token that was just refused is not tried again.
 const kept = sessionStorage.getItem('token');
+// What was asked for is opened with the token; the address with a ticket is worth nothing any more.
+const page = location.pathname === '/open' ? '/' : location.pathname;
+document.querySelector('form').action = page;
 if (kept && !new URLSearchParams(location.search).has('token')) {
   sessionStorage.removeItem('token');
-  location.replace('/?token=' + encodeURIComponent(kept));
+  location.replace(page + '?token=' + encodeURIComponent(kept));
 }

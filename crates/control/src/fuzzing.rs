@@ -12,9 +12,9 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::Semaphore;
 
-use crate::http::{self, App, Pace, Shown, hand};
+use crate::http::{self, App, Pace, People, Shown, hand};
 use crate::token::Ticket;
-use crate::{Board, LinkEditor, Stage, Token};
+use crate::{Board, Guests, LinkEditor, Stage, Token};
 
 /// Number of polls in a row without a moved byte, after which a connection counts as over.
 const IDLE_POLLS: u32 = 16;
@@ -45,9 +45,9 @@ impl Site {
             shown: Shown::default(),
             editor: Arc::new(tokio::sync::Mutex::new(editor)),
             token,
-            guests: None,
+            guests: Guests::default(),
             hosts: Vec::new(),
-            stage: Some(Arc::clone(&stage)),
+            people: People::Stage(Arc::clone(&stage)),
             comparing: Semaphore::new(1),
             pace: Pace::default(),
             patience: http::PATIENCE,

@@ -53,8 +53,8 @@ mod typed;
 mod views;
 
 pub use board::{Board, Latest, LinkEditor};
-pub use server::{ServeError, Server, ServerConfig, serve, serve_stage};
+pub use server::{ServeError, Server, ServerConfig, serve, serve_stage, serve_study};
 pub use snapshot::{Body, Description, Kind, LinkName, MeasureLabel, PeerName};
 pub use snapshot::{LinkCounters, PeerView, Presence, Quantiles, Snapshot, TurnView};
-pub use stage::{Role, Stage, StageFile};
-pub use token::{Token, TokenError};
+pub use stage::{Hands, Role, Stage, StageFile, Study};
+pub use token::{Guests, Token, TokenError};

@@ -9,9 +9,9 @@ use thiserror::Error;
 use tokio::runtime::Builder;
 use tokio::sync::{Mutex, Semaphore, oneshot};
 
-use crate::http::{self, App, Pace, Shown};
+use crate::http::{self, App, Pace, People, Shown};
 use crate::token::Ticket;
-use crate::{Board, LinkEditor, Stage, Token, TokenError};
+use crate::{Board, Guests, LinkEditor, Stage, Study, Token, TokenError};
 
 /// Address and admission rules of a server.
 #[derive(Clone, Debug)]
@@ -69,7 +69,7 @@ pub enum ServeError {
 pub struct Server {
     address: SocketAddr,
     token: Token,
-    guests: Option<Token>,
+    guests: Guests,
     ticket: Arc<Ticket>,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
@@ -81,7 +81,7 @@ pub struct Server {
 ///
 /// [`ServeError`] if the address is not allowed, or if the system refuses a socket, a thread or random numbers.
 pub fn serve(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>) -> Result<Server, ServeError> {
-    start(config, board, editor, None)
+    start(config, board, editor, Guests::default(), People::Nobody)
 }
 
 /// Starts the server of a run in which people take part from a page. Links for guests contain a token of their own, which allows no changes except of a hand.
@@ -90,10 +90,29 @@ pub fn serve(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor
 ///
 /// The errors of [`serve()`].
 pub fn serve_stage(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>, stage: Arc<dyn Stage>) -> Result<Server, ServeError> {
-    start(config, board, editor, Some(stage))
+    // A second token, so that the host can hand out links without giving away the right to change the run.
+    let guests = Guests::default();
+    guests.set(vec![Token::random()?]);
+    start(config, board, editor, guests, People::Stage(stage))
 }
 
-fn start(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>, stage: Option<Arc<dyn Stage>>) -> Result<Server, ServeError> {
+/// Starts the server of a study. The token of the server is that of the experimenter, and `guests` has one token per person, which the study may replace.
+/// Links and counters are shown to the experimenter alone, so that no page of a person tells the condition.
+///
+/// # Errors
+///
+/// The errors of [`serve()`].
+pub fn serve_study(
+    config: ServerConfig,
+    board: Arc<Board>,
+    editor: Box<dyn LinkEditor>,
+    guests: Guests,
+    study: Arc<dyn Study>,
+) -> Result<Server, ServeError> {
+    start(config, board, editor, guests, People::Study(study))
+}
+
+fn start(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>, guests: Guests, people: People) -> Result<Server, ServeError> {
     let address = config.address;
     // An IPv4 loopback address may come mapped into IPv6, which only the canonical form shows.
     if !address.ip().to_canonical().is_loopback() && !config.allow_remote {
@@ -108,8 +127,6 @@ fn start(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>, s
     let listener = TcpListener::bind(address).map_err(listen)?;
     listener.set_nonblocking(true).map_err(listen)?;
     let address = listener.local_addr().map_err(listen)?;
-    // A second token, so that the host can hand out links without giving away the right to change the run.
-    let guests = if stage.is_some() { Some(Token::random()?) } else { None };
     let ticket = Arc::new(Ticket::default());
     let app = App {
         board,
@@ -119,7 +136,7 @@ fn start(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>, s
         token: token.clone(),
         guests: guests.clone(),
         hosts: config.hosts,
-        stage,
+        people,
         comparing: Semaphore::new(1),
         pace: Pace::default(),
         patience: http::PATIENCE,
@@ -168,7 +185,13 @@ impl Server {
     /// Returns the link for guests, with the guests' token; `None` if the run has no part for people.
     #[must_use]
     pub fn join_url(&self) -> Option<String> {
-        self.guests.as_ref().map(|guests| format!("http://{}/join?token={}", self.reachable(), guests.secret()))
+        self.join_urls().into_iter().next()
+    }
+
+    /// Returns a link for each guest, in the order of the guests' tokens.
+    #[must_use]
+    pub fn join_urls(&self) -> Vec<String> {
+        self.guests.tokens().iter().map(|token| format!("http://{}/join?token={}", self.reachable(), token.secret())).collect()
     }
 
     /// Returns the secret to be shown by requests.

@@ -1,5 +1,7 @@
-//! The interface of a run in which people take part from a page.
+//! The interfaces of runs in which people take part from a page: a stage, on which everybody tries things out, and a study, which leads people from trial to
+//! trial.
 
+use core::time::Duration;
 use std::sync::Arc;
 
 use serde_json::Value;
@@ -22,12 +24,8 @@ pub struct StageFile {
     pub bytes: Vec<u8>,
 }
 
-/// A run in which people take part from a page. The methods are called on threads of the server, possibly several at once, and must not wait for the
-/// real-time side.
-pub trait Stage: Send + Sync {
-    /// Returns a JSON object with everything that a page must know of the run besides its state. The entry `part` changes when the run restarts.
-    fn facts(&self, role: Role) -> Value;
-
+/// Hands that pages move over WebSockets. The methods are called on threads of the server, possibly several at once, and must not wait for the real-time side.
+pub trait Hands: Send + Sync {
     /// Returns the newest picture of the motion as JSON text, and the picture's number. Numbers grow from picture to picture.
     fn frame(&self) -> (u64, Arc<str>);
 
@@ -48,6 +46,36 @@ pub trait Stage: Send + Sync {
     /// Gives a hand back, for somebody else to take.
     fn leave_hand(&self, hand: usize);
 
+    /// Returns what the page of a hand has to show besides pictures, as the text of a JSON object, with the number of the text. `None` if the page has shown
+    /// the text of the number `shown` already. Numbers begin with 1.
+    fn news(&self, _hand: usize, _shown: u64) -> Option<(u64, String)> {
+        None
+    }
+
+    /// Takes a word of the page of a hand that is not a position.
+    ///
+    /// # Errors
+    ///
+    /// The reason why the page must not say the word. The connection ends then.
+    fn hear(&self, _hand: usize, _word: &str) -> Result<(), String> {
+        Err("expected a position".to_owned())
+    }
+
+    /// Returns the time between two measurements of a page's round trip; `None` if nobody wants round trips.
+    fn measures_round_trips(&self) -> Option<Duration> {
+        None
+    }
+
+    /// Takes a measured round trip: the time from a ping of the server to the answer of the browser.
+    fn round_trip(&self, _hand: usize, _took: Duration) {}
+}
+
+/// A run in which people take part from a page. The methods are called on threads of the server, possibly several at once, and must not wait for the
+/// real-time side.
+pub trait Stage: Hands {
+    /// Returns a JSON object with everything that a page must know of the run besides its state. The entry `part` changes when the run restarts.
+    fn facts(&self, role: Role) -> Value;
+
     /// Restarts the run, with the change described by `wish`.
     ///
     /// # Errors
@@ -64,4 +92,26 @@ pub trait Stage: Send + Sync {
 
     /// Returns a file of the newest recording by its name; `None` if no such file exists.
     fn file(&self, name: &str) -> Option<StageFile>;
+}
+
+/// A run that leads the people of a group from page to page, and has an experimenter. Person number N has the token number N of the
+/// [`Guests`](crate::Guests), and moves hand number N. The methods are called on threads of the server, possibly several at once, and must not wait for the
+/// real-time side.
+pub trait Study: Hands {
+    /// Returns a JSON object with all that the page of the experimenter shows.
+    fn overview(&self) -> Value;
+
+    /// Does what the experimenter asks for.
+    ///
+    /// # Errors
+    ///
+    /// The reason of the refusal, for the experimenter. Nothing has changed then.
+    fn command(&self, wish: &Value) -> Result<(), String>;
+
+    /// Takes what a person says on a page, such as consent or answers to questions.
+    ///
+    /// # Errors
+    ///
+    /// The reason of the refusal, for the person. Nothing has changed then.
+    fn tell(&self, person: usize, said: &Value) -> Result<(), String>;
 }

@@ -2,7 +2,7 @@
 
 use core::fmt;
 use core::str::FromStr;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use subtle::ConstantTimeEq as _;
 use thiserror::Error;
@@ -45,7 +45,7 @@ impl Token {
     /// # Errors
     ///
     /// [`TokenError::NoRandomNumbers`] if the system returns no random numbers.
-    pub(crate) fn random() -> Result<Self, TokenError> {
+    pub fn random() -> Result<Self, TokenError> {
         let mut bytes = [0; RANDOM_BYTES];
         getrandom::fill(&mut bytes).map_err(|error| TokenError::NoRandomNumbers(error.to_string()))?;
         Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
@@ -86,6 +86,32 @@ impl fmt::Debug for Token {
     }
 }
 
+/// Tokens of guests, in an order that tells guests apart. The run may replace the tokens at any time. Clones share the tokens.
+#[derive(Clone, Debug, Default)]
+pub struct Guests(Arc<Mutex<Vec<Token>>>);
+
+impl Guests {
+    /// Replaces all tokens. Connections that showed an old token go on, and their next request is refused.
+    pub fn set(&self, tokens: Vec<Token>) {
+        *self.lock() = tokens;
+    }
+
+    /// Returns the tokens.
+    #[must_use]
+    pub fn tokens(&self) -> Vec<Token> {
+        self.lock().clone()
+    }
+
+    /// Returns the number of the guest whose token is `offered`; `None` if no guest has the token.
+    pub(crate) fn find(&self, offered: &[u8]) -> Option<usize> {
+        self.lock().iter().position(|token| token.is(offered))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Vec<Token>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 /// The valid ticket; `None` before the first is issued and after its use.
 #[derive(Debug, Default)]
 pub(crate) struct Ticket(Mutex<Option<Token>>);
@@ -116,7 +142,7 @@ impl Ticket {
 
 #[cfg(test)]
 mod tests {
-    use super::{Ticket, Token, TokenError};
+    use super::{Guests, Ticket, Token, TokenError};
 
     #[test]
     fn random_tokens_differ_and_can_be_given_again() {
@@ -143,6 +169,17 @@ mod tests {
         assert_eq!("a".repeat(257).parse::<Token>().unwrap_err(), TokenError::Length { found: 257 });
         assert_eq!("0123456789abcdef&0123456".parse::<Token>().unwrap_err(), TokenError::Character { found: '&' });
         assert_eq!("ä".repeat(22).parse::<Token>().unwrap_err(), TokenError::Character { found: 'ä' });
+    }
+
+    #[test]
+    fn guests_are_told_apart_by_their_tokens_until_these_are_replaced() {
+        let guests = Guests::default();
+        let tokens = [(); 3].map(|()| Token::random().unwrap());
+        assert_eq!(guests.find(tokens[0].secret().as_bytes()), None);
+        guests.clone().set(tokens.to_vec());
+        assert_eq!(tokens.each_ref().map(|token| guests.find(token.secret().as_bytes())), [Some(0), Some(1), Some(2)]);
+        guests.set(vec![tokens[2].clone()]);
+        assert_eq!(tokens.each_ref().map(|token| guests.find(token.secret().as_bytes())), [None, None, Some(0)]);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use cohaptic_live::{EndedPacket, Motion, PeerStatus};
 
 /// The newest motion. The motion is written as text when a page asks, on the page's thread, so that the real-time thread does not spend the time.
 #[derive(Default)]
-pub(super) struct Frames(Mutex<Newest>);
+pub(crate) struct Frames(Mutex<Newest>);
 
 #[derive(Default)]
 struct Newest {
@@ -25,14 +25,14 @@ struct Newest {
 
 impl Frames {
     /// Begins a part whose scene has `axes` axes. The motion of the part before is dropped.
-    pub(super) fn begin(&self, part: usize, axes: usize) {
+    pub(crate) fn begin(&self, part: usize, axes: usize) {
         let mut newest = self.newest();
         // A page must not show the motion of the part before as the motion of this part.
         (newest.part, newest.axes, newest.motion) = (part, axes, None);
     }
 
     /// Stores a motion as the newest. Readers hold the lock only while they clone a reference, so that the real-time thread does not wait long.
-    pub(super) fn publish(&self, motion: Motion) {
+    pub(crate) fn publish(&self, motion: Motion) {
         let mut newest = self.newest();
         newest.number += 1;
         newest.motion = Some(Arc::new(motion));
@@ -46,7 +46,7 @@ impl Frames {
     /// Returns the number and the JSON text of the newest motion. The text is `{}` before the first motion.
     ///
     /// Between [`begin`](Self::begin) and the first motion of the part, an already written text of the part before is returned again.
-    pub(super) fn text(&self) -> (u64, Arc<str>) {
+    pub(crate) fn text(&self) -> (u64, Arc<str>) {
         let (number, part, axes, motion) = {
             let newest = self.newest();
             // Several pages ask for the same motion, and the text is written once.

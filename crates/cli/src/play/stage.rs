@@ -1,6 +1,6 @@
 //! The stage of `cohaptic play`: answers the requests of the pages for hands, for another part, for a comparison, and for files of the last part.
 //!
-//! Threads of the control server call [`Stage`], and the thread of the session calls the inherent methods. Each changing field is atomic or has a lock of its
+//! Threads of the control server call [`Hands`] and [`Stage`], and the thread of the session calls the inherent methods. Each changing field is atomic or has a lock of its
 //! own.
 
 use std::path::{Path, PathBuf};
@@ -9,13 +9,13 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant as Clock};
 
-use cohaptic_control::{LinkEditor, Role, Stage, StageFile};
+use cohaptic_control::{Hands, LinkEditor, Role, Stage, StageFile};
 use cohaptic_harness::live::LiveDevice;
 use cohaptic_live::PeerStatus;
 use cohaptic_live::pointers::Pointer;
 use cohaptic_peer::Coordination;
 use cohaptic_scene::{PeerKind, Scene, TaskKind};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::compare::{Finished, compare};
 use super::frames::Frames;
@@ -167,37 +167,7 @@ impl PlayStage {
     }
 }
 
-impl Stage for PlayStage {
-    fn facts(&self, role: Role) -> Value {
-        let Ok(part) = self.running() else { return json!({ "part": 0 }) };
-        let Part { number, scene, .. } = &*part;
-        let peer = |(place, peer): (usize, &cohaptic_scene::PeerSpec)| {
-            let is_pointer = matches!(peer.kind, PeerKind::Pointer(..));
-            let grasp = scene.rotation.as_ref().map(|rotation| rotation.peers[place].grasp);
-            json!({ "name": peer.name, "kind": peer.kind.name(), "hand": is_pointer, "taken": lock(&self.taken)[place], "grasp": grasp })
-        };
-        let is_host = role == Role::Host;
-        json!({
-            "part": number,
-            "title": scene.title,
-            "axes": scene.axes.count(),
-            "strategy": scene.coordination.strategy.name(),
-            "strategies": Coordination::ALL.iter().map(|strategy| strategy.name()).collect::<Vec<_>>(),
-            "peers": scene.peers.iter().enumerate().map(peer).collect::<Vec<_>>(),
-            "fewest_peers": PEERS.start(),
-            "most_peers": PEERS.end(),
-            "edges": scene.rotation.as_ref().and_then(|_| scene.even_box()),
-            "walls": scene.object.enclosure.map(|walls| [walls.min, walls.max]),
-            "task": scene.task.as_ref().map(|task| task.kind.name()),
-            "path": scene.task.as_ref().and_then(|task| if let TaskKind::Path(path) = &task.kind { Some(&path.points) } else { None }),
-            "guided": self.is_guided,
-            "host": is_host,
-            // The address holds the token of guests, so that only the host hands out the address.
-            "join": self.join.get().filter(|_| is_host),
-            "recorded": self.last_finished().map(|finished| finished.number),
-        })
-    }
-
+impl Hands for PlayStage {
     fn frame(&self) -> (u64, Arc<str>) {
         self.frames.text()
     }
@@ -228,6 +198,35 @@ impl Stage for PlayStage {
             let _ = pointer.tell(None);
             lock(&self.taken)[hand] = false;
         }
+    }
+}
+
+impl Stage for PlayStage {
+    fn facts(&self, role: Role) -> Value {
+        let Ok(part) = self.running() else { return json!({ "part": 0 }) };
+        let Part { number, scene, .. } = &*part;
+        let is_host = role == Role::Host;
+        let of_session = json!({
+            "part": number,
+            "title": scene.title,
+            "strategy": scene.coordination.strategy.name(),
+            "strategies": Coordination::ALL.iter().map(|strategy| strategy.name()).collect::<Vec<_>>(),
+            "fewest_peers": PEERS.start(),
+            "most_peers": PEERS.end(),
+            "guided": self.is_guided,
+            "host": is_host,
+            // The address holds the token of guests, so that only the host hands out the address.
+            "join": self.join.get().filter(|_| is_host),
+            "recorded": self.last_finished().map(|finished| finished.number),
+        });
+        let mut facts = scene_facts(scene);
+        for (place, (peer, taken)) in scene.peers.iter().zip(lock(&self.taken).iter()).enumerate() {
+            let is_pointer = matches!(peer.kind, PeerKind::Pointer(..));
+            let own = &mut facts["peers"][place];
+            (own["kind"], own["hand"], own["taken"]) = (peer.kind.name().into(), is_pointer.into(), (*taken).into());
+        }
+        facts.extend(of_session.as_object().into_iter().flatten().map(|(key, value)| (key.clone(), value.clone())));
+        facts.into()
     }
 
     fn begin_anew(&self, wish: &Value) -> Result<(), String> {
@@ -269,6 +268,21 @@ impl Stage for PlayStage {
             _ => None,
         }
     }
+}
+
+/// Returns what a page needs of a scene to draw the scene's motion.
+pub(crate) fn scene_facts(scene: &Scene) -> Map<String, Value> {
+    let grasp = |place: usize| scene.rotation.as_ref().map(|rotation| rotation.peers[place].grasp);
+    let peers = scene.peers.iter().enumerate().map(|(place, peer)| json!({ "name": peer.name, "grasp": grasp(place) }));
+    let facts = [
+        ("axes", json!(scene.axes.count())),
+        ("peers", peers.collect()),
+        ("edges", json!(scene.rotation.as_ref().and_then(|_| scene.even_box()))),
+        ("walls", json!(scene.object.enclosure.map(|walls| [walls.min, walls.max]))),
+        ("task", json!(scene.task.as_ref().map(|task| task.kind.name()))),
+        ("path", json!(scene.task.as_ref().and_then(|task| if let TaskKind::Path(path) = &task.kind { Some(&path.points) } else { None }))),
+    ];
+    facts.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
 fn read(path: &Path) -> Option<Vec<u8>> {

@@ -28,7 +28,7 @@ function drawAll(passed, now) {
   follow(passed);
   lookAround(passed);
   const { context, width, height } = sized(canvas);
-  rooms = layRooms(width, height, shown.length, ownPlace());
+  rooms = facts.alone ? aloneIn(width, height, ownPlace()) : layRooms(width, height, shown.length, ownPlace());
   rooms.forEach((room, i) => drawRoom(context, room, i));
   drawPackets(context, rooms, now);
 }
@@ -44,7 +44,7 @@ function drawRoom(context, room, i) {
   context.clip();
   if (facts.walls) drawWalls(context, room);
   drawTarget(context, room);
-  shown.forEach((other, k) => { if (k !== i) drawGhost(context, room, other, k); });
+  if (!facts.alone) shown.forEach((other, k) => { if (k !== i) drawGhost(context, room, other, k); });
   const body = shown[i];
   drawCube(context, room, body, i);
   drawDwell(context, room);

@@ -31,7 +31,8 @@ function showHolding() {
   put(button, hand.holding ? 'Let go' : 'Take hold');
   const holds = hand.pressed ? 'you hold it until you release' : 'you hold it: Escape lets go';
   put($('holding'), ownHand === null ? 'you look on' : hand.holding ? holds : 'nobody holds your device');
-  $('sway').setAttribute('aria-pressed', String(hand.swaying !== null));
+  // In a study nobody moves the hand but the person.
+  $('sway')?.setAttribute('aria-pressed', String(hand.swaying !== null));
   $('rooms').classList.toggle('held', hand.holding);
 }
 
@@ -67,7 +68,7 @@ function makeHand() {
     event.preventDefault();
   }, { passive: false });
   $('grasp').addEventListener('click', () => (hand.holding ? letGo() : takeHold()));
-  $('sway').addEventListener('click', () => {
+  $('sway')?.addEventListener('click', () => {
     takeHold();
     hand.swaying = hand.swaying === null && hand.holding ? { begin: performance.now(), from: [...hand.at] } : null;
     showHolding();

@@ -27,6 +27,13 @@ function layRooms(width, height, number, own) {
   });
 }
 
+/** The own room alone: in a study others are felt, and seen only as far as the network shows them in the own copy. */
+function aloneIn(width, height, own) {
+  const all = [];
+  [all[own]] = layRooms(width, height, 1, 0);
+  return all;
+}
+
 /** Points of a room per metre. */
 const scaleOf = (room) => Math.min(room.width, room.height) / 2 / reach;
 const middleOf = (room) => ({ x: room.left + room.width / 2, y: room.top + room.height / 2 });
@@ -50,7 +57,7 @@ function inWorld(room, dx, dy) {
 function lookAround(passed) {
   const size = facts.edges ? lengthOf(facts.edges) / 2 : 0;
   let most = 0.12;
-  for (const { at, device } of shown) for (const place of [at, device]) most = Math.max(most, 1.15 * (Math.max(...place.map(Math.abs)) + size));
+  for (const { at, device } of facts.alone ? [shown[ownPlace()]] : shown) for (const place of [at, device]) most = Math.max(most, 1.15 * (Math.max(...place.map(Math.abs)) + size));
   // The target is seen before anybody is there.
   if (frame.task) most = Math.max(most, 1.15 * (Math.max(...wide(frame.task.at).map(Math.abs)) + (frame.task.radius || 0)));
   most = Math.min(most, LARGEST_REACH + size);

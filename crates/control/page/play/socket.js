@@ -8,8 +8,16 @@ const AGAIN = 1000;
 let ownHand = null;
 let socket = null;
 
-/** Connects for ever. `onFrame` gets each picture, `onTrouble` a text when the connection is lost, and null when it is back. */
-function connect(onFrame, onTrouble) {
+/** What ends the connection for good. */
+let disconnect = () => {};
+
+/** Connects for ever. `onFrame` gets each picture, `onNews` what a study says, `onTrouble` a text when the connection is lost, and null when it is back. */
+function connect(onFrame, onTrouble, onNews) {
+  let ended = false;
+  disconnect = () => {
+    ended = true;
+    socket.close();
+  };
   let wanted = new URLSearchParams(location.search).get('hand');
   const open = () => {
     const query = new URLSearchParams({ token });
@@ -29,10 +37,12 @@ function connect(onFrame, onTrouble) {
         // Of a connection that was lost the server may not know yet: then any hand will do.
         wanted = said.hand === null ? null : String(said.hand);
         onTrouble(said.refused ? 'You look on: ' + said.refused : null, said.hand === null);
-      } else if (said.peers) onFrame(said);
+      } else if (said.page) onNews(said);
+      else if (said.peers) onFrame(said);
     };
     own.onclose = () => {
       clearTimeout(timer);
+      if (ended) return;
       letGo();
       onTrouble('The server does not answer. What is shown is old. Trying again …', false);
       setTimeout(open, AGAIN);

@@ -9,7 +9,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Redirect, Response};
 
 use super::places::Seat;
-use super::{App, Refusal, page};
+use super::{App, People, Refusal, page};
 use crate::Role;
 
 /// Headers added to every answer without a header of the same name.
@@ -29,18 +29,20 @@ pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: N
     let seat = request.extensions().get::<Arc<Seat>>().cloned();
     // The host is checked before the token: a page of another site must not learn whether a token is right.
     let known = check_host(&app, request.uri(), request.headers());
-    let admitted = known.and_then(|()| check_token(&app, request.uri(), request.headers())).and_then(|role| sit(seat.as_deref(), role));
+    let shown = known.and_then(|()| check_token(&app, request.uri(), request.headers()));
+    let admitted = shown.and_then(|shown| sit(seat.as_deref(), shown));
     // Only guests wait for their turn, so guests cannot delay the host.
-    if matches!(admitted, Ok(Role::Guest)) {
+    if matches!(admitted, Ok(Visitor::Guest(_))) {
         app.pace.turn().await;
     }
-    let mut answer = match admitted.and_then(|role| may(role, request.method())) {
+    let mut answer = match admitted.and_then(|visitor| may(&app, visitor, &request)) {
         // Tried only without a token, since every try uses the ticket up.
         Err(refusal) if refusal.status == StatusCode::UNAUTHORIZED && has_ticket(&app, request.uri(), request.method()) => {
             Redirect::to(&format!("/?token={}", app.token.secret())).into_response()
         }
-        Ok(role) => {
-            request.extensions_mut().insert(role);
+        Ok(visitor) => {
+            request.extensions_mut().insert(visitor.role());
+            request.extensions_mut().insert(visitor);
             next.run(request).await
         }
         // A browser gets a page with a field for the token instead of JSON.
@@ -67,19 +69,28 @@ pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: N
 }
 
 /// Counts the connection among the connections of `role`, or refuses if all places of the role are taken.
-fn sit(seat: Option<&Seat>, role: Role) -> Result<Role, Refusal> {
-    if seat.is_some_and(|seat| !seat.show(role)) {
+fn sit(seat: Option<&Seat>, visitor: Visitor) -> Result<Visitor, Refusal> {
+    if seat.is_some_and(|seat| !seat.show(visitor.role())) {
         return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "too many connections are open with this token: close some, or try again later"));
     }
-    Ok(role)
+    Ok(visitor)
 }
 
-/// Refuses all requests of guests except GET. A WebSocket for a hand begins with GET too.
-fn may(role: Role, method: &Method) -> Result<Role, Refusal> {
-    if role == Role::Guest && method != Method::GET {
+/// Refuses all requests of guests except GET. A WebSocket for a hand begins with GET too. In a study, people also send consent and answers.
+fn may(app: &App, visitor: Visitor, request: &Request) -> Result<Visitor, Refusal> {
+    let is_answer = matches!(app.people, People::Study(_)) && request.uri().path() == "/api/person";
+    if visitor.role() == Role::Guest && request.method() != Method::GET && !is_answer {
         return Err(Refusal::new(StatusCode::FORBIDDEN, "only the person who started the run may change it: this token is that of a guest"));
     }
-    Ok(role)
+    Ok(visitor)
+}
+
+/// Layer that refuses guests.
+pub(super) async fn host_only(axum::Extension(role): axum::Extension<Role>, request: Request, next: Next) -> Response {
+    if role == Role::Guest {
+        return Refusal::new(StatusCode::FORBIDDEN, "only the experimenter may see this: this token is that of a participant").into_response();
+    }
+    next.run(request).await
 }
 
 /// Refuses requests for unknown hosts, in the `Host` header or in the request line.
@@ -105,16 +116,29 @@ fn has_ticket(app: &App, uri: &Uri, method: &Method) -> bool {
     uri.path() == "/open" && method == Method::GET && offered().is_some_and(|offered| app.ticket.redeem(offered.as_bytes()))
 }
 
-/// Returns the role of the token, shown in the header `Authorization` or in the query.
-fn check_token(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<Role, Refusal> {
+/// The person behind a request, by the shown token.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Visitor {
+    Host,
+    /// Guest with the token of this number.
+    Guest(usize),
+}
+
+impl Visitor {
+    const fn role(self) -> Role {
+        match self {
+            Self::Host => Role::Host,
+            Self::Guest(_) => Role::Guest,
+        }
+    }
+}
+
+/// Returns the owner of the token, shown in the header `Authorization` or in the query.
+fn check_token(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<Visitor, Refusal> {
     let in_header = headers.get_all(header::AUTHORIZATION).iter().filter_map(|value| bearer(value.as_bytes()));
     let in_query = uri.query().unwrap_or_default().split('&').filter_map(|part| part.strip_prefix("token=")).map(str::as_bytes);
-    let role_of = |offered: &[u8]| match &app.guests {
-        _ if app.token.is(offered) => Some(Role::Host),
-        Some(guests) if guests.is(offered) => Some(Role::Guest),
-        Some(_) | None => None,
-    };
-    in_header.chain(in_query).find_map(role_of).ok_or_else(|| {
+    let owner = |offered: &[u8]| if app.token.is(offered) { Some(Visitor::Host) } else { app.guests.find(offered).map(Visitor::Guest) };
+    in_header.chain(in_query).find_map(owner).ok_or_else(|| {
         Refusal::new(
             StatusCode::UNAUTHORIZED,
             "no token, or a wrong one: show it as \"Authorization: Bearer TOKEN\" or as ?token=TOKEN; it was printed when the server started",

@@ -1,4 +1,4 @@
-//! The WebSocket of a page with a hand: positions of the hand come in, pictures of the motion go out.
+//! The WebSocket of a page with a hand: positions of the hand and words of the page come in, pictures of the motion and news of the run go out.
 
 use core::pin::pin;
 use core::time::Duration;
@@ -13,16 +13,18 @@ use futures_util::{Sink, SinkExt as _, Stream as Incoming, StreamExt as _};
 use hyper::upgrade::{OnUpgrade, Upgraded};
 use hyper_util::rt::TokioIo;
 use serde_json::json;
-use tokio::time::{MissedTickBehavior, interval, timeout};
+use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::handshake::server::create_response_with_body;
 use tokio_tungstenite::tungstenite::protocol::{Role as End, WebSocketConfig};
 use tokio_tungstenite::tungstenite::{Error, Message};
 
 use super::frames::Counted;
+use super::guard::Visitor;
 use super::places::Seat;
-use super::{App, Refusal};
-use crate::Stage;
+use super::round_trips::RoundTrips;
+use super::{App, People, Refusal};
+use crate::Hands;
 
 /// Length of the longest accepted message \[byte\]. Three numbers with all digits take 75 bytes.
 const LONGEST: usize = 128;
@@ -30,6 +32,8 @@ const LONGEST: usize = 128;
 const READ_AT_ONCE: usize = 8 * LONGEST;
 /// Shortest time between two pictures of the motion.
 const EVERY: Duration = Duration::from_millis(16);
+/// Longest time without a message. A page takes four seconds of silence for a lost connection, and between two trials of a study nothing moves.
+const SILENCE: Duration = Duration::from_secs(1);
 /// Time after which a page that accepts no picture counts as gone.
 const PATIENCE: Duration = Duration::from_secs(5);
 
@@ -43,11 +47,19 @@ fn read(text: &str) -> Option<Place> {
 }
 
 /// `GET /api/hand`: takes a hand for a page, and switches to a WebSocket. The query `hand=NUMBER` asks for a hand, `hand=none` only watches, and a missing
-/// `hand` takes any free hand.
-pub(super) async fn connect(State(app): State<Arc<App>>, mut request: Request) -> Result<Response, Refusal> {
-    let stage = app.stage()?;
+/// `hand` takes any free hand. In a study each person has a hand, by the token, and the experimenter has none.
+pub(super) async fn connect(
+    State(app): State<Arc<App>>,
+    axum::Extension(visitor): axum::Extension<Visitor>,
+    mut request: Request,
+) -> Result<Response, Refusal> {
+    let hands = app.hands()?;
     check_origin(request.headers())?;
-    let wanted = wanted(request.uri())?;
+    let wanted = match (&app.people, visitor) {
+        (People::Study(_), Visitor::Guest(person)) => Wanted::One(person),
+        (People::Study(_), Visitor::Host) => Wanted::None,
+        (People::Stage(_) | People::Nobody, _) => wanted(request.uri())?,
+    };
     let seat = request.extensions().get::<Arc<Seat>>().cloned();
     // The answer is made first, so that a request without a WebSocket takes no hand.
     let answer = create_response_with_body(&request, Body::empty)
@@ -55,11 +67,11 @@ pub(super) async fn connect(State(app): State<Arc<App>>, mut request: Request) -
     let upgrade = hyper::upgrade::on(&mut request);
     let hand = match wanted {
         Wanted::None => Ok(None),
-        Wanted::Any => stage.take_hand(None).map(Some),
-        Wanted::One(hand) => stage.take_hand(Some(hand)).map(Some),
+        Wanted::Any => hands.take_hand(None).map(Some),
+        Wanted::One(hand) => hands.take_hand(Some(hand)).map(Some),
     };
     // The upgrade completes after the answer has been sent, so the conversation waits on a task of its own.
-    tokio::spawn(talk(stage, hand, upgrade, seat));
+    tokio::spawn(talk(hands, hand, upgrade, seat));
     Ok(answer.into_response())
 }
 
@@ -97,13 +109,22 @@ fn wanted(uri: &Uri) -> Result<Wanted, Refusal> {
 
 /// A taken hand. Dropping the value gives the hand back, however the connection ends.
 struct Taken {
-    stage: Arc<dyn Stage>,
+    hands: Arc<dyn Hands>,
     hand: usize,
+    /// Round trips of the page; `None` if nobody wants round trips.
+    trips: Option<RoundTrips>,
+}
+
+impl Taken {
+    fn new(hands: Arc<dyn Hands>, hand: usize) -> Self {
+        let trips = hands.measures_round_trips().map(|every| RoundTrips::new(every, Instant::now()));
+        Self { hands, hand, trips }
+    }
 }
 
 impl Drop for Taken {
     fn drop(&mut self) {
-        self.stage.leave_hand(self.hand);
+        self.hands.leave_hand(self.hand);
     }
 }
 
@@ -113,62 +134,95 @@ fn limits() -> WebSocketConfig {
 }
 
 /// Serves the WebSocket of a page until its end. Holds `seat`, the place of the connection, as long.
-async fn talk(stage: Arc<dyn Stage>, hand: Result<Option<usize>, String>, upgrade: OnUpgrade, seat: Option<Arc<Seat>>) {
+async fn talk(hands: Arc<dyn Hands>, hand: Result<Option<usize>, String>, upgrade: OnUpgrade, seat: Option<Arc<Seat>>) {
     // A refused hand is told to the page, which may still watch.
     let greeting = match &hand {
         Ok(hand) => json!({ "hand": hand }),
         Err(reason) => json!({ "hand": null, "refused": reason }),
     };
-    let taken = hand.ok().flatten().map(|hand| Taken { stage: Arc::clone(&stage), hand });
+    let taken = hand.ok().flatten().map(|hand| Taken::new(Arc::clone(&hands), hand));
     let Ok(upgraded) = upgrade.await else { return };
     let stream = Counted::new(TokioIo::new(upgraded));
     let socket: WebSocketStream<Counted<TokioIo<Upgraded>>> = WebSocketStream::from_raw_socket(stream, End::Server, Some(limits())).await;
     let (mut out, incoming) = socket.split();
-    if send(&mut out, greeting.to_string()).await {
+    if send(&mut out, Message::text(greeting.to_string())).await {
         // Whichever future ends first ends both.
-        select(pin!(listen(&taken, incoming)), pin!(show(&*stage, out))).await;
+        select(pin!(listen(&taken, incoming)), pin!(show(&*hands, &taken, out))).await;
     }
     // The hand and the place are free only after the end of both directions.
     drop((taken, seat));
 }
 
-/// Moves the hand by the messages of a page, until the page goes or sends a message no page sends.
+/// Moves the hand by the messages of a page, and passes on other words, until the page goes or sends a message no page sends.
 async fn listen(taken: &Option<Taken>, mut incoming: impl Incoming<Item = Result<Message, Error>> + Unpin) {
     while let Some(Ok(message)) = incoming.next().await {
-        let place = match message {
-            Message::Text(text) => read(&text),
+        match (message, taken) {
+            (Message::Text(text), Some(Taken { hands, hand, .. })) => {
+                let understood = match read(&text) {
+                    Some(place) => hands.move_hand(*hand, place),
+                    None => hands.hear(*hand, &text),
+                };
+                if understood.is_err() {
+                    return;
+                }
+            }
+            // A page that only watches moves nothing, and says nothing else.
+            (Message::Text(text), None) if read(&text).is_some() => {}
+            (Message::Pong(echo), Some(Taken { hands, hand, trips: Some(trips) })) => {
+                if let Some(took) = trips.end(&echo, Instant::now()) {
+                    hands.round_trip(*hand, took);
+                }
+            }
             // The WebSocket library answers pings.
-            Message::Ping(_) | Message::Pong(_) => continue,
-            Message::Binary(_) | Message::Close(_) | Message::Frame(_) => None,
-        };
-        let Some(place) = place else { return };
-        if let Some(Taken { stage, hand }) = taken
-            && stage.move_hand(*hand, place).is_err()
-        {
-            return;
+            (Message::Ping(_) | Message::Pong(_), _) => {}
+            (Message::Text(_) | Message::Binary(_) | Message::Close(_) | Message::Frame(_), _) => return,
         }
     }
 }
 
 /// Moves a hand by the bytes of a page, until the bytes end or contain a message no page sends.
 #[cfg(fuzzing)]
-pub(crate) async fn hear(stage: Arc<dyn Stage>, hand: usize, stream: impl tokio::io::AsyncRead + tokio::io::AsyncWrite + Unpin) {
+pub(crate) async fn hear(hands: Arc<dyn Hands>, hand: usize, stream: impl tokio::io::AsyncRead + tokio::io::AsyncWrite + Unpin) {
     let (_, incoming) = WebSocketStream::from_raw_socket(Counted::new(stream), End::Server, Some(limits())).await.split();
-    listen(&Some(Taken { stage, hand }), incoming).await;
+    listen(&Some(Taken::new(hands, hand)), incoming).await;
 }
 
-/// Sends each new picture of the motion, until the page accepts no more.
-async fn show(stage: &dyn Stage, mut out: impl Sink<Message> + Unpin) {
+/// Sends each new picture of the motion, and news for the page's hand, until the page accepts no more or answers no pings.
+async fn show(hands: &dyn Hands, taken: &Option<Taken>, mut out: impl Sink<Message> + Unpin) {
     let mut ticks = interval(EVERY);
     // A slow page gets fewer pictures, not old pictures.
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let mut shown = 0;
+    let (mut shown, mut told, mut last) = (0, 0, Instant::now());
     loop {
         ticks.tick().await;
-        let (number, frame) = stage.frame();
+        let now = Instant::now();
+        let mut messages = Vec::new();
+        if let Some(Taken { hand, trips, .. }) = taken {
+            // News come before the picture, because the page needs the facts of a run for the run's pictures.
+            if let Some((number, news)) = hands.news(*hand, told) {
+                told = number;
+                messages.push(Message::text(news));
+            }
+            if let Some(trips) = trips {
+                if trips.is_silent(now) {
+                    return;
+                }
+                messages.extend(trips.begin(now).map(Message::Ping));
+            }
+        }
+        let (number, frame) = hands.frame();
         if number != shown {
             shown = number;
-            if !send(&mut out, frame.to_string()).await {
+            messages.push(Message::text(frame.to_string()));
+        }
+        if messages.iter().any(Message::is_text) {
+            last = now;
+        } else if now > last + SILENCE {
+            last = now;
+            messages.push(Message::text("{}"));
+        }
+        for message in messages {
+            if !send(&mut out, message).await {
                 return;
             }
         }
@@ -176,8 +230,8 @@ async fn show(stage: &dyn Stage, mut out: impl Sink<Message> + Unpin) {
 }
 
 /// Sends a message. Returns whether the page accepted the message in time.
-async fn send(out: &mut (impl Sink<Message> + Unpin), text: String) -> bool {
-    matches!(timeout(PATIENCE, out.send(Message::text(text))).await, Ok(Ok(())))
+async fn send(out: &mut (impl Sink<Message> + Unpin), message: Message) -> bool {
+    matches!(timeout(PATIENCE, out.send(message)).await, Ok(Ok(())))
 }
 
 #[cfg(test)]

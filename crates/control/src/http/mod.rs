@@ -13,7 +13,9 @@ mod patient;
 mod places;
 mod play;
 mod read;
+mod round_trips;
 mod shown;
+mod study;
 #[cfg(test)]
 mod tests;
 
@@ -22,20 +24,28 @@ use std::sync::Arc;
 
 use axum::Router;
 use axum::http::{HeaderValue, Method, StatusCode, Uri, header};
-use axum::middleware::from_fn_with_state;
+use axum::middleware::{from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use serde_json::{Value, json};
 use tokio::sync::{Mutex, OwnedMutexGuard, Semaphore};
 
 use crate::token::Ticket;
-use crate::{Board, LinkEditor, Stage, Token};
+use crate::{Board, Guests, Hands, LinkEditor, Stage, Study, Token};
 
 #[cfg(fuzzing)]
 pub(crate) use connection::answer_bytes;
 pub(crate) use connection::{PATIENCE, answer_all};
 pub(crate) use pace::Pace;
 pub(crate) use shown::Shown;
+
+/// How people take part in a run from pages.
+#[derive(Clone)]
+pub(crate) enum People {
+    Nobody,
+    Stage(Arc<dyn Stage>),
+    Study(Arc<dyn Study>),
+}
 
 /// State shared by all requests.
 pub(crate) struct App {
@@ -46,11 +56,10 @@ pub(crate) struct App {
     pub(crate) editor: Arc<Mutex<Box<dyn LinkEditor>>>,
     pub(crate) token: Token,
     pub(crate) ticket: Arc<Ticket>,
-    /// Token of guests; `None` for a run without guests.
-    pub(crate) guests: Option<Token>,
+    /// Tokens of guests. Empty for a run without guests.
+    pub(crate) guests: Guests,
     pub(crate) hosts: Vec<String>,
-    /// Run in which people take part; `None` for other runs.
-    pub(crate) stage: Option<Arc<dyn Stage>>,
+    pub(crate) people: People,
     /// Permit of the only comparison at a time, since a comparison keeps a core busy.
     pub(crate) comparing: Semaphore,
     /// Turns of guests' requests.
@@ -65,9 +74,23 @@ impl App {
         Arc::clone(&self.editor).lock_owned().await
     }
 
-    /// Returns the run in which people take part; refuses a request to any other run.
+    /// Returns the stage; refuses a request to any other run.
     fn stage(&self) -> Result<Arc<dyn Stage>, Refusal> {
-        self.stage.clone().ok_or_else(|| Refusal::new(StatusCode::NOT_FOUND, "nobody takes part from a page here"))
+        if let People::Stage(stage) = &self.people { Ok(Arc::clone(stage)) } else { Err(nobody()) }
+    }
+
+    /// Returns the study; refuses a request to any other run.
+    fn study(&self) -> Result<Arc<dyn Study>, Refusal> {
+        if let People::Study(study) = &self.people { Ok(Arc::clone(study)) } else { Err(nobody()) }
+    }
+
+    /// Returns the hands of the run; refuses a request to a run without hands.
+    fn hands(&self) -> Result<Arc<dyn Hands>, Refusal> {
+        match &self.people {
+            People::Stage(stage) => Ok(Arc::clone(stage) as _),
+            People::Study(study) => Ok(Arc::clone(study) as _),
+            People::Nobody => Err(nobody()),
+        }
     }
 
     /// Parses the number of a link; `None` if no link has the number.
@@ -80,19 +103,31 @@ impl App {
 /// Builds the routes, all protected by the guard.
 pub(crate) fn router(app: App) -> Router {
     let app = Arc::new(app);
-    let pages = if app.stage.is_some() { play::routes() } else { Router::new().route("/", get(page::page)) };
-    pages
+    let pages = match app.people {
+        People::Nobody => Router::new().route("/", get(page::page)),
+        People::Stage(_) => play::routes(),
+        People::Study(_) => study::routes(),
+    };
+    let counters = Router::new()
         .route("/api/state", get(read::state))
         .route("/api/links", get(read::links).patch(change::all))
         .route("/api/links/{link}", get(read::link).patch(change::one))
         .route("/api/histograms", get(read::histograms))
         .route("/api/events", get(read::events))
-        .route("/metrics", get(read::metrics))
+        .route("/metrics", get(read::metrics));
+    // The links of a study tell its condition, which people must not know.
+    let counters = if matches!(app.people, People::Study(_)) { counters.route_layer(from_fn(guard::host_only)) } else { counters };
+    pages
+        .merge(counters)
         .fallback(not_found)
         .method_not_allowed_fallback(method_not_allowed)
         // Layers added last run first: the guard sees every request, also for unknown paths.
         .layer(from_fn_with_state(Arc::clone(&app), guard::guard))
         .with_state(app)
+}
+
+fn nobody() -> Refusal {
+    Refusal::new(StatusCode::NOT_FOUND, "nobody takes part from a page here")
 }
 
 /// A refusal with its reason for the user, sent as `{"error": "…"}`.
@@ -136,7 +171,8 @@ async fn method_not_allowed(method: Method, uri: Uri) -> Refusal {
     let expected = match uri.path() {
         path if path.starts_with("/api/links") => "GET or PATCH",
         "/api/play" => "GET or POST",
-        "/api/compare" => "POST",
+        "/api/study" => "GET or POST",
+        "/api/compare" | "/api/person" => "POST",
         _ => "GET",
     };
     Refusal::new(StatusCode::METHOD_NOT_ALLOWED, format!("{method} is nothing that {} does: expected {expected}", uri.path().escape_debug()))

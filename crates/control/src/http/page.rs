@@ -51,6 +51,32 @@ const PLAY_SCRIPT: &str = concat!(
 
 static PLAY: LazyLock<Document> = LazyLock::new(|| Document::new(include_str!("../../page/play/page.html"), PLAY_STYLE, PLAY_SCRIPT));
 
+const STUDY_STYLE: &str =
+    concat!(include_str!("../../page/style.css"), include_str!("../../page/play/style.css"), include_str!("../../page/study/style.css"));
+const PERSON_SCRIPT: &str = concat!(
+    include_str!("../../page/server.js"),
+    include_str!("../../page/words.js"),
+    include_str!("../../page/turn.js"),
+    include_str!("../../page/play/socket.js"),
+    include_str!("../../page/play/motion.js"),
+    include_str!("../../page/play/rooms.js"),
+    include_str!("../../page/play/packets.js"),
+    include_str!("../../page/play/task.js"),
+    include_str!("../../page/play/draw.js"),
+    include_str!("../../page/play/hand.js"),
+    include_str!("../../page/play/keyboard.js"),
+    include_str!("../../page/play/gamepad.js"),
+    include_str!("../../page/study/words.js"),
+    include_str!("../../page/study/questions.js"),
+    include_str!("../../page/study/person.js"),
+);
+const EXPERIMENTER_SCRIPT: &str =
+    concat!(include_str!("../../page/server.js"), include_str!("../../page/words.js"), include_str!("../../page/study/experimenter.js"));
+
+static PERSON: LazyLock<Document> = LazyLock::new(|| Document::new(include_str!("../../page/study/person.html"), STUDY_STYLE, PERSON_SCRIPT));
+static EXPERIMENTER: LazyLock<Document> =
+    LazyLock::new(|| Document::new(include_str!("../../page/study/experimenter.html"), STUDY_STYLE, EXPERIMENTER_SCRIPT));
+
 /// A page with its content security policy.
 struct Document {
     html: String,
@@ -92,6 +118,16 @@ pub(super) async fn page() -> Response {
 /// Answers with the page of a run in which people take part.
 pub(super) async fn play() -> Response {
     PLAY.answer(StatusCode::OK)
+}
+
+/// Answers with the page of a person in a study.
+pub(super) async fn person() -> Response {
+    PERSON.answer(StatusCode::OK)
+}
+
+/// Answers with the page of a study's experimenter.
+pub(super) async fn experimenter() -> Response {
+    EXPERIMENTER.answer(StatusCode::OK)
 }
 
 /// Answers a browser without a token: the document reads the token from the tab's storage, or asks for the token.

@@ -12,9 +12,11 @@ use tokio::runtime::{Builder, Runtime};
 use tokio::sync::Semaphore;
 use tower::ServiceExt as _;
 
-use super::{App, Pace, Shown, router};
+use super::{App, Pace, People, Shown, router};
 use crate::token::Ticket;
-use crate::{Board, Body as ObjectBody, Description, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Snapshot, TurnView};
+use crate::{
+    Board, Body as ObjectBody, Description, Guests, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Snapshot, TurnView,
+};
 
 pub(super) const TOKEN: &str = "a-token-of-more-than-22-characters";
 
@@ -75,9 +77,9 @@ impl Site {
             shown: Shown::default(),
             editor: Arc::new(tokio::sync::Mutex::new(Box::new(Recorder(Arc::clone(&calls))))),
             token: TOKEN.parse().unwrap(),
-            guests: None,
+            guests: Guests::default(),
             hosts: vec!["lab.example".to_owned()],
-            stage: None,
+            people: People::Nobody,
             comparing: Semaphore::new(1),
             pace: Pace::default(),
             patience: Duration::from_millis(200),

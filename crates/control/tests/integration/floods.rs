@@ -7,7 +7,7 @@ use std::net::TcpStream;
 use std::sync::Arc;
 use std::time::Instant;
 
-use cohaptic_control::{Role, Server, ServerConfig, Stage, StageFile, serve_stage};
+use cohaptic_control::{Hands, Role, Server, ServerConfig, Stage, StageFile, serve_stage};
 use serde_json::Value;
 
 use crate::run::{NoLinks, TOKEN, empty_board};
@@ -18,11 +18,7 @@ const SOON: Duration = Duration::from_secs(8);
 /// Stage on which hands move nothing, for guests who only watch.
 struct Onlookers;
 
-impl Stage for Onlookers {
-    fn facts(&self, _: Role) -> Value {
-        Value::Null
-    }
-
+impl Hands for Onlookers {
     fn frame(&self) -> (u64, Arc<str>) {
         (0, Arc::from(""))
     }
@@ -36,6 +32,12 @@ impl Stage for Onlookers {
     }
 
     fn leave_hand(&self, _: usize) {}
+}
+
+impl Stage for Onlookers {
+    fn facts(&self, _: Role) -> Value {
+        Value::Null
+    }
 
     fn begin_anew(&self, _: &Value) -> Result<(), String> {
         Ok(())

@@ -7,3 +7,4 @@ mod contrast;
 mod floods;
 mod run;
 mod server;
+mod study;
