@@ -109,7 +109,10 @@ pub(super) const PLAY: &[&str] =
 pub(super) const STUDY: &[&str] =
     &["cohaptic study run studies/pull/study.toml --dry-run --out dry", "cohaptic study verify dry", "cohaptic study forget P07 dry"];
 
-pub(super) const STUDY_RUN: &[&str] = &["cohaptic study run studies/pull/study.toml --dry-run --times 100 --out dry"];
+pub(super) const STUDY_RUN: &[&str] = &[
+    "cohaptic study run studies/pull/study.toml --dry-run --times 100 --out dry",
+    "cohaptic study run studies/pull/study.toml --out data --control 0.0.0.0:8080 --allow-remote",
+];
 
 pub(super) const STUDY_FOLDER: &[&str] = &["cohaptic study report dry", "cohaptic study verify dry"];
 

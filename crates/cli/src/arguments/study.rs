@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use cohaptic_study::PersonCode;
 
+use super::RealTimeArguments;
 use super::examples::{self, after};
 use super::numbers::{integer, threads};
 
@@ -33,7 +34,7 @@ pub(crate) struct StudyRunArguments {
     /// The study, a TOML file
     pub(crate) study: PathBuf,
     /// Let modelled persons play, through the same orders, trials and tables as people
-    #[arg(long, required = true)]
+    #[arg(long, conflicts_with = "RealTimeArguments")]
     pub(crate) dry_run: bool,
     /// Number of dry runs, each with other persons: says how often each difference is found
     #[arg(long, value_name = "N", default_value_t = 1, requires = "dry_run", allow_negative_numbers = true, value_parser = integer::<u64>(1, 99_999))]
@@ -42,8 +43,10 @@ pub(crate) struct StudyRunArguments {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Number of trials of dry runs made at the same time [default: one per core]. Results do not depend on it
-    #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
+    #[arg(long, value_name = "N", visible_alias = "jobs", requires = "dry_run", allow_negative_numbers = true, value_parser = threads)]
     pub(crate) threads: Option<u16>,
+    #[command(flatten)]
+    pub(crate) real_time: RealTimeArguments,
 }
 
 #[derive(Debug, Args)]

@@ -27,7 +27,9 @@ use cohaptic_harness::task::task_words;
 use cohaptic_live::{Conductor, LinkChange, Motion, Recorded, Report, Session, SessionConfig, Status};
 use cohaptic_scene::{PeerKind, link_keys_of_text, scene_content_of_text};
 
+pub(crate) use self::frames::Frames;
 use self::scene::{PEERS, PlayedScene};
+pub(crate) use self::stage::scene_facts;
 use self::stage::{Part, PartLinks, PlayStage};
 use crate::arguments::PlayArguments;
 use crate::failure::Failure;

@@ -1,4 +1,7 @@
-//! `cohaptic study`: dry runs, reports, verification, and persons who are forgotten.
+//! `cohaptic study`: sessions with people, dry runs, reports, verification, and persons who are forgotten.
+
+#[cfg(target_os = "linux")]
+mod serve;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -18,11 +21,24 @@ const MOST_DIFFERENCES: usize = 50;
 /// Does what a command on a study asks for.
 pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitCode, Failure> {
     match &arguments.command {
-        StudyCommand::Run(arguments) => dry_run(arguments),
+        StudyCommand::Run(arguments) if arguments.dry_run => dry_run(arguments),
+        StudyCommand::Run(arguments) => with_people(arguments),
         StudyCommand::Report(arguments) => report(arguments),
         StudyCommand::Verify(arguments) => verify(arguments),
         StudyCommand::Forget(arguments) => forget(arguments),
     }
+}
+
+/// Lets people play the study, and serves their pages.
+#[cfg(target_os = "linux")]
+fn with_people(arguments: &StudyRunArguments) -> Result<ExitCode, Failure> {
+    let study = Study::read(&arguments.study)?;
+    serve::serve(arguments, StudyFolder::open(study, &arguments.out, PROGRAM).map_err(failure)?)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn with_people(_: &StudyRunArguments) -> Result<ExitCode, Failure> {
+    Err(Failure::System("cohaptic study with people needs Linux: its clocks are those of Linux. --dry-run runs everywhere".to_owned()))
 }
 
 /// Lets modelled persons play the study, and prints the means and the power.

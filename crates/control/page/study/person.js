@@ -86,6 +86,7 @@ function showWords(before) {
   else $('questions').replaceChildren();
   $('left').hidden = now.page !== 'break' || now.may_end;
   breakEnd = performance.now() + 1000 * (now.left_s || 0);
+  showLeft();
   $('buttons').replaceChildren(...buttons);
   note(now.note || '', false);
   // A page to be read begins at its heading, and any other at what is pressed next.

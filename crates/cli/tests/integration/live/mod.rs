@@ -17,6 +17,8 @@ mod play_page;
 mod records;
 mod session;
 mod strangers;
+mod study;
+mod study_page;
 
 use std::time::{Duration, Instant};
 

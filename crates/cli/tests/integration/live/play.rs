@@ -17,9 +17,9 @@ use crate::integration::desk::Desk;
 pub(super) struct Page(WebSocket<TcpStream>);
 
 impl Page {
-    /// Connects with `query` appended to the address. The error is the HTTP status of a refusal.
-    fn try_open(control: &Control, query: &str, header: Option<(&'static str, &str)>) -> Result<Self, u16> {
-        let stream = TcpStream::connect(&control.host).unwrap();
+    /// Connects with `query` appended to the address. The error is the HTTP status of a refusal, or 0 if the server is gone.
+    pub(super) fn try_open(control: &Control, query: &str, header: Option<(&'static str, &str)>) -> Result<Self, u16> {
+        let Ok(stream) = TcpStream::connect(&control.host) else { return Err(0) };
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         let mut request = format!("ws://{}/api/hand?token={}{query}", control.host, control.token).into_client_request().unwrap();
         if let Some((name, value)) = header {
@@ -28,6 +28,7 @@ impl Page {
         match tungstenite::client(request, stream) {
             Ok((socket, _)) => Ok(Self(socket)),
             Err(tungstenite::HandshakeError::Failure(tungstenite::Error::Http(answer))) => Err(answer.status().as_u16()),
+            Err(tungstenite::HandshakeError::Failure(_)) => Err(0),
             Err(other) => panic!("{other}"),
         }
     }
@@ -37,7 +38,7 @@ impl Page {
     }
 
     /// The next message; `None` once the server has closed.
-    fn next(&mut self) -> Option<Value> {
+    pub(super) fn next(&mut self) -> Option<Value> {
         loop {
             match self.0.read() {
                 Ok(Message::Text(text)) => return Some(serde_json::from_str(&text).unwrap()),
@@ -47,7 +48,7 @@ impl Page {
         }
     }
 
-    fn say(&mut self, text: impl Into<String>) -> bool {
+    pub(super) fn say(&mut self, text: impl Into<String>) -> bool {
         self.0.send(Message::text(text.into())).is_ok()
     }
 

@@ -1,4 +1,4 @@
-//! Running process of `cohaptic live` or `cohaptic play`.
+//! Running process of `cohaptic live`, `cohaptic play` or `cohaptic study`.
 
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::net::SocketAddr;
@@ -29,6 +29,17 @@ impl Session {
     /// Starts `cohaptic play`. `words` are the arguments after `play`.
     pub(super) fn play(desk: &Desk, words: &str) -> Self {
         Self::of(desk, &format!("play {words}"))
+    }
+
+    /// Starts `cohaptic study`. `words` are the arguments after `study`.
+    pub(super) fn study(desk: &Desk, words: &str) -> Self {
+        Self::of(desk, &format!("study {words}"))
+    }
+
+    /// Kills the process, as a loss of power does: the process cannot finish anything.
+    pub(super) fn kill(mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
     }
 
     fn of(desk: &Desk, line: &str) -> Self {
