@@ -8,7 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use cohaptic_control::{
-    Board, Description, Kind, LinkCounters, LinkEditor, LinkName, PeerName, PeerView, Role, ServerConfig, Snapshot, Stage, StageFile, serve_stage,
+    Board, Description, Hands, Kind, LinkCounters, LinkEditor, LinkName, PeerName, PeerView, Role, ServerConfig, Snapshot, Stage, StageFile,
+    serve_stage,
 };
 use serde_json::{Value, json};
 
@@ -163,11 +164,7 @@ impl LinkEditor for NoKeys {
 /// A run on whose page everybody looks on.
 struct Onlookers;
 
-impl Stage for Onlookers {
-    fn facts(&self, _: Role) -> Value {
-        json!({ "part": 1 })
-    }
-
+impl Hands for Onlookers {
     fn frame(&self) -> (u64, Arc<str>) {
         (0, Arc::from("{}"))
     }
@@ -181,6 +178,12 @@ impl Stage for Onlookers {
     }
 
     fn leave_hand(&self, _: usize) {}
+}
+
+impl Stage for Onlookers {
+    fn facts(&self, _: Role) -> Value {
+        json!({ "part": 1 })
+    }
 
     fn begin_anew(&self, _: &Value) -> Result<(), String> {
         Err("a flood is one part".to_owned())
