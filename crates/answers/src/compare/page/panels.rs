@@ -220,3 +220,15 @@ impl Sheet<'_> {
 fn from_place(place: usize) -> f64 {
     f64::from(u32::try_from(place).unwrap_or(u32::MAX))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_share_of_an_outcome_is_that_of_its_own_runs() {
+        let cell = Cell { refused: None, diverged: Share::of(1, 4), done: Share::of(3, 4), figures: Vec::new() };
+        let drawn = |outcome: Outcome| (outcome.name(), outcome.share(&cell).map(|share| share.count));
+        assert_eq!((drawn(Outcome::Diverged), drawn(Outcome::Done)), (("diverged", Some(1)), ("done", Some(3))));
+    }
+}
