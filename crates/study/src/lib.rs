@@ -25,6 +25,7 @@ mod analysis;
 mod codes;
 mod dry_run;
 mod error;
+mod exact;
 mod folder;
 mod model;
 mod order;

@@ -16,6 +16,7 @@ fn help_names_the_commands() {
             "stability",
             "admittance",
             "play",
+            "study",
             "relay",
             "router",
             "link",

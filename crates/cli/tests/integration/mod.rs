@@ -72,6 +72,7 @@ mod stability_wave_certificates;
 mod standard_input;
 #[cfg(target_os = "linux")]
 mod stop;
+mod study;
 mod svg;
 mod sweep;
 #[cfg(target_os = "linux")]

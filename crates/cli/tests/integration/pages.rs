@@ -50,9 +50,12 @@ fn nothing_is_written_over_unless_forced() {
 #[test]
 fn a_schema_of_each_kind_of_file_is_printed() {
     let desk = Desk::new();
-    for (kind, title, key) in
-        [("", "cohaptic scene", "coordination"), ("relay", "cohaptic relay file", "programs"), ("router", "cohaptic router file", "rules")]
-    {
+    for (kind, title, key) in [
+        ("", "cohaptic scene", "coordination"),
+        ("relay", "cohaptic relay file", "programs"),
+        ("router", "cohaptic router file", "rules"),
+        ("study", "cohaptic study file", "conditions"),
+    ] {
         let schema = parse(&desk.text(&format!("schema {kind}")));
         assert_eq!((&schema["$schema"], &schema["title"]), (&"http://json-schema.org/draft-07/schema#".into(), &title.into()));
         assert!(schema["properties"][key]["description"].is_string(), "{kind}");

@@ -49,8 +49,10 @@ pub struct TrialRecord {
     /// Outcome of the task in a word.
     pub outcome: String,
     /// Time from the start of the task to its outcome \[s\].
+    #[serde(with = "crate::exact::number")]
     pub time_s: f64,
     /// Values of the measures, in the order of [`Study::measures`](crate::Study::measures); `None` for a measure without a value.
+    #[serde(with = "crate::exact::named")]
     pub values: Vec<(String, Option<f64>)>,
 }
 
