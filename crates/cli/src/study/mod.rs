@@ -140,8 +140,12 @@ fn failure(error: StudyError) -> Failure {
     match error {
         StudyError::Study(error) => Failure::Scene(error),
         StudyError::File { verb, path, error } => Failure::File { verb, path, error },
-        error if error.is_io() => Failure::System(error.to_string()),
-        error => Failure::Input(error.to_string()),
+        error @ (StudyError::Busy { .. } | StudyError::Damaged { .. }) => Failure::System(error.to_string()),
+        error @ (StudyError::Refused(_)
+        | StudyError::Other { .. }
+        | StudyError::Foreign { .. }
+        | StudyError::NoStudy { .. }
+        | StudyError::Nobody { .. }) => Failure::Input(error.to_string()),
     }
 }
 

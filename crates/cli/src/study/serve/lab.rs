@@ -505,7 +505,7 @@ impl Lab {
             state.people.replace(seat);
             self.admit(state, tokens)
         });
-        state.failure = state.failure.take().or(freed.err());
+        state.failure = state.failure.take().or_else(|| freed.err());
     }
 
     fn stop_trial(&self, state: &mut State, wish: Wish) -> Result<(), String> {
