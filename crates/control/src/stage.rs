@@ -46,8 +46,8 @@ pub trait Hands: Send + Sync {
     /// Gives a hand back, for somebody else to take.
     fn leave_hand(&self, hand: usize);
 
-    /// Returns what the page of a hand has to show besides pictures, as the text of a JSON object, with the number of the text. `None` if the page has shown
-    /// the text of the number `shown` already. Numbers begin with 1.
+    /// Returns news for the page of a hand, as the text of a JSON object, with the number of the news. `None` if the page has shown the news of the number
+    /// `shown` already. Numbers begin with 1.
     fn news(&self, _hand: usize, _shown: u64) -> Option<(u64, String)> {
         None
     }
@@ -98,17 +98,17 @@ pub trait Stage: Hands {
 /// [`Guests`](crate::Guests), and moves hand number N. The methods are called on threads of the server, possibly several at once, and must not wait for the
 /// real-time side.
 pub trait Study: Hands {
-    /// Returns a JSON object with all that the page of the experimenter shows.
+    /// Returns the content of the experimenter's page, as a JSON object.
     fn overview(&self) -> Value;
 
-    /// Does what the experimenter asks for.
+    /// Carries out a command of the experimenter.
     ///
     /// # Errors
     ///
     /// The reason of the refusal, for the experimenter. Nothing has changed then.
     fn command(&self, wish: &Value) -> Result<(), String>;
 
-    /// Takes what a person says on a page, such as consent or answers to questions.
+    /// Takes a word or answers from a person's page, such as consent or answers to questions.
     ///
     /// # Errors
     ///

@@ -39,7 +39,7 @@ pub(crate) use connection::{PATIENCE, answer_all};
 pub(crate) use pace::Pace;
 pub(crate) use shown::Shown;
 
-/// How people take part in a run from pages.
+/// Part of people in a run, by pages.
 #[derive(Clone)]
 pub(crate) enum People {
     Nobody,

@@ -30,7 +30,7 @@ pub(super) fn routes() -> Router<Arc<App>> {
         .route("/api/person", post(tell))
 }
 
-/// `GET /`: the page of the one who asks.
+/// `GET /`: the page of the experimenter, or of the person with the shown token.
 async fn own_page(axum::Extension(visitor): axum::Extension<Visitor>) -> Response {
     match visitor {
         Visitor::Host => page::experimenter().await,
@@ -42,14 +42,14 @@ async fn overview(State(app): State<Arc<App>>) -> Result<Response, Refusal> {
     Ok(answer(&app.study()?.overview()))
 }
 
-/// `POST /api/study`: does what the experimenter asks for, and answers with the new overview.
+/// `POST /api/study`: carries out a command of the experimenter, and answers with the new overview.
 async fn command(State(app): State<Arc<App>>, body: Body) -> Result<Response, Refusal> {
     let wish = read(&app, body).await?;
     let study = app.study()?;
     run(move || study.command(&wish).map(|()| study.overview())).await
 }
 
-/// `POST /api/person`: takes what a person says. The new page of the person comes over the WebSocket.
+/// `POST /api/person`: takes a word or answers of a person. The new page of the person comes over the WebSocket.
 async fn tell(State(app): State<Arc<App>>, axum::Extension(visitor): axum::Extension<Visitor>, body: Body) -> Result<Response, Refusal> {
     let Visitor::Guest(person) = visitor else {
         return Err(Refusal::new(StatusCode::FORBIDDEN, "only a participant may say this: this token is that of the experimenter"));

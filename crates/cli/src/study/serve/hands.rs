@@ -1,4 +1,5 @@
-//! Hands of the people, and what their browsers say of themselves. Written by the threads of the server, and read by the real-time thread without waiting.
+//! Hands of the people, with connection, visibility and round trips of each browser. Written by the threads of the server, and read by the real-time thread
+//! without waiting.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -96,8 +97,8 @@ impl Hand {
         lock(&self.trips).last().copied()
     }
 
-    /// Begins a trial at the instant `now`, and returns the pointer as a device of the trial's session. The pointer is new, because each trial begins at the same
-    /// place.
+    /// Begins a trial at the instant `now`, and returns the pointer as a device of the trial's session. The pointer is new, because each trial begins at the
+    /// same place.
     pub(super) fn begin(&self, now: Clock) -> Box<dyn LiveDevice> {
         self.was_lost.store(!self.is_connected(), Ordering::Relaxed);
         self.was_hidden.store(self.is_hidden(), Ordering::Relaxed);
@@ -108,7 +109,7 @@ impl Hand {
         pointer.device()
     }
 
-    /// Returns why the trial is not valid, for this person, at the instant `now`; `None` for a valid trial so far.
+    /// Returns the fault of the trial on the side of this person, at the instant `now`; `None` for a valid trial so far.
     pub(super) fn fault(&self, now: Clock) -> Option<Fault> {
         let heard = self.begun + Duration::from_millis(self.heard.load(Ordering::Relaxed));
         if self.was_lost.load(Ordering::Relaxed) {

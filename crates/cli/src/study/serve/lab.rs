@@ -1,4 +1,4 @@
-//! The group under way: answers the pages of people and of the experimenter, and keeps what they do.
+//! The group under way: answers the pages of people and of the experimenter, and keeps answers, trials and the experimenter's decisions.
 //!
 //! Threads of the control server call [`Hands`] and [`StudyPages`]. The main thread waits for trials and runs them.
 
@@ -21,7 +21,7 @@ use crate::study::failure;
 /// Time between two pings of a browser: a trial of three seconds has thirty.
 const PING: Duration = Duration::from_millis(100);
 
-/// The group under way, with everything that the threads share.
+/// The group under way, with all data shared by the threads.
 pub(super) struct Lab {
     pub(super) study: Study,
     folder: Mutex<StudyFolder>,
@@ -76,7 +76,7 @@ pub(super) enum Wish {
     Abandon,
 }
 
-/// What the main thread has to do.
+/// Work for the main thread.
 pub(super) enum Task {
     Trial(TrialPlan),
     /// The people have new addresses, which are printed: code and address of each person.
@@ -138,7 +138,7 @@ impl Lab {
         state.session.people().iter().map(ToString::to_string).zip(self.guests.tokens().iter().map(address)).collect()
     }
 
-    /// Waits until there is something to do for the main thread, at most for `most`.
+    /// Waits for work for the main thread, at most for `most`.
     pub(super) fn next_task(&self, most: Duration) -> Result<Option<Task>, Failure> {
         let mut state = lock(&self.state);
         if let Some(task) = self.task(&mut state)? {
@@ -201,7 +201,7 @@ impl Lab {
         self.ends_trial.load(Ordering::Relaxed)
     }
 
-    /// Ends the trial, and returns what the experimenter wished meanwhile.
+    /// Ends the trial, and returns the experimenter's wish of the meantime.
     pub(super) fn end_trial(&self) -> Wish {
         let mut state = lock(&self.state);
         state.people.work = Work::Keeping;
@@ -295,7 +295,7 @@ impl Lab {
         state.session.people().iter().zip(&self.hands).filter(|(_, hand)| is_away(hand)).map(|(code, _)| code.to_string()).collect()
     }
 
-    /// Does what `next` asks for at this point.
+    /// Carries out the experimenter's `next` at this point.
     fn next(&self, state: &mut State) -> Result<(), String> {
         match state.session.step() {
             Step::Done | Step::Abandoned if !state.is_closed => Err("the tables of the group are being written".to_owned()),

@@ -66,7 +66,7 @@ pub(super) fn serve(arguments: &StudyRunArguments, folder: StudyFolder) -> Resul
     let url = reached_from_elsewhere(server.address(), server.url());
     let site = url.split_once("/?token=").map_or(url.as_str(), |(site, _)| site).to_owned();
     lab.open(Site { url: site, port: server.address().port(), experimenter: server.token().clone() }, kept.as_ref())?;
-    // What is kept, is kept with each event, so that a signal ends the program at once between two events.
+    // Each event is on the disk before the next, so that a signal ends the program at once between two events.
     interrupt::has_results();
     say(&format!("experimenter: {url}"));
     while !interrupt::requested() {
@@ -147,7 +147,7 @@ fn one_trial(arguments: &StudyRunArguments, lab: &Arc<Lab>, board: &Arc<Board>, 
     lab.keep_trial(TrialFacts { faults, late_ticks: report.late_ticks, round_trips }, [of_experimenter, of_people])
 }
 
-/// Returns why a trial is not valid, for people.
+/// Returns the reason for which a trial is not valid, in words for people.
 const fn words(fault: Fault) -> &'static str {
     match fault {
         Fault::LateTicks => "the computer was too busy",

@@ -1,4 +1,4 @@
-//! What the page of the experimenter shows: who is there, where the group is, what may be done, and how the last trial went.
+//! Content of the experimenter's page: connected people, place of the group in the study, possible commands, and verdict on the last trial.
 
 use std::time::Instant as Clock;
 
@@ -44,7 +44,7 @@ pub(super) fn of(lab: &Lab, state: &State) -> Value {
     })
 }
 
-/// Returns where the group is, in words, and what `next` does; `None` if `next` does nothing now.
+/// Returns the place of the group in the study, in words, and the effect of `next`; `None` if `next` is refused now.
 fn place(lab: &Lab, state: &State) -> (String, Option<&'static str>) {
     let codes = |is_one: &dyn Fn(usize) -> bool| -> String {
         let codes: Vec<String> =

@@ -1,4 +1,4 @@
-//! People of a group on their way from page to page: codes, consent, instructions, readiness, and which page each person sees. Without clock, files and network.
+//! People of a group on the way from page to page: codes, consent, instructions, readiness, and the page of each person. Without clock, files and network.
 
 use cohaptic_study::{After, Question, QuestionKind, Sequence, Step, Study, TLX, TrialPlan};
 use serde_json::{Value, json};
@@ -47,7 +47,7 @@ pub(super) struct People {
     /// `true` once everybody takes part. A person who is replaced after that would change the group.
     has_begun: bool,
     pub(super) work: Work,
-    /// Whether the present break may end.
+    /// `true` if the present break may end.
     pub(super) may_end_break: bool,
     /// Line about the trial before, for the people.
     pub(super) note: String,
@@ -58,7 +58,7 @@ pub(super) struct People {
 }
 
 impl People {
-    /// Returns the people of a session. People of a session with events have agreed and read the instructions before.
+    /// Returns the people of a session. In a session with events, all people have agreed and read the instructions before.
     pub(super) fn of(session: &Sequence) -> Self {
         let has_begun = !session.events().is_empty();
         let way = if has_begun { Way::In } else { Way::Code };
@@ -177,7 +177,7 @@ fn trial(plan: &TrialPlan) -> Value {
     json!({ "number": plan.code.number, "of": plan.of, "practice": plan.practice })
 }
 
-/// Returns what questions are about, in words.
+/// Returns the subject of questions, in words.
 const fn about(after: After) -> &'static str {
     match after {
         After::Trial => "about the last trial",

@@ -1,4 +1,4 @@
-//! Texts of a study on a page: headings, paragraphs and lists of Markdown. Everything else stands on the page as written, so that no text can add markup.
+//! Texts of a study on a page: headings, paragraphs and lists of Markdown. All other marks stand on the page as written, so that no text can add markup.
 
 use serde::Serialize;
 
@@ -23,7 +23,7 @@ pub(super) enum Block {
 /// Reads the blocks of a text. Lines up to an empty line are one paragraph, `#` begins a heading, and `-`, `*` or a number with a point begins an item.
 pub(super) fn blocks(text: &str) -> Vec<Block> {
     let mut blocks = Vec::new();
-    // Whether the next line without a mark goes on with the last block.
+    // `true` if the next line without a mark goes on with the last block.
     let mut goes_on = false;
     for line in text.lines().map(str::trim) {
         if line.is_empty() {

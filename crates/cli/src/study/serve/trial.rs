@@ -1,4 +1,4 @@
-//! One trial: a part of `cohaptic play` with the scene of the condition, which ends with the outcome of its task, or when the trial cannot be valid any more.
+//! Run of a trial: a part of `cohaptic play` with the scene of the condition. The trial ends with the outcome of the task, or with the first fault.
 
 use std::io::Write as _;
 use std::net::SocketAddr;
@@ -20,10 +20,10 @@ use crate::interrupt;
 use crate::live::onlookers;
 use crate::realtime::Look;
 
-/// How a trial has ended.
+/// Result of a trial.
 pub(super) struct Ended {
     pub(super) report: Report,
-    /// Why the trial is not valid, found while it ran; empty for a valid trial so far.
+    /// Faults of the trial; empty for a valid trial.
     pub(super) faults: Vec<Fault>,
 }
 
