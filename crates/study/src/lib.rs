@@ -25,7 +25,6 @@ mod analysis;
 mod codes;
 mod dry_run;
 mod error;
-mod exact;
 mod folder;
 mod model;
 mod order;

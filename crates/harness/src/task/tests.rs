@@ -280,7 +280,7 @@ fn a_peer_that_is_not_judged_is_asked_for_the_target_of_the_leading_peer() {
         tick(&mut judge, millis(0), peer, (position, 0.0, 0.0), None, &mut |_, _| ());
     }
     judge.settle(&mut |_, _| ());
-    assert_eq!([0, 1, 2].map(|peer| judge.asks(peer, millis(1), 0.1).0[0]), [0.1, 0.3, 0.3]);
+    assert_eq!([0, 1, 2].map(|peer| judge.asks(peer, millis(1), 0.1).0[0].to_bits()), [0.1_f64, 0.3, 0.3].map(f64::to_bits));
 }
 
 #[test]

@@ -17,7 +17,6 @@ use super::Watch;
 use crate::analysis::{Analysis, Observation};
 use crate::codes::GroupCode;
 use crate::error::StudyError;
-use crate::exact::Exact;
 use crate::folder::StudyFolder;
 use crate::model::{Person, Study};
 use crate::report::short;
@@ -60,13 +59,13 @@ pub struct DifferencePower {
 #[serde(deny_unknown_fields)]
 struct Run {
     /// Mean difference, p and corrected p, indexed by measure and condition from the second on; `None` for a measure without units.
-    differences: Vec<Vec<Option<[Exact; 3]>>>,
+    differences: Vec<Vec<Option<[f64; 3]>>>,
 }
 
 impl Run {
     fn of(study: &Study, analysis: &Analysis) -> Self {
         let measure = |measure: &crate::analysis::Analysed| {
-            let figures = |place: usize| measure.differences.get(place).map(|found| [found.estimate.mean, found.p, found.p_holm].map(Exact));
+            let figures = |place: usize| measure.differences.get(place).map(|found| [found.estimate.mean, found.p, found.p_holm]);
             (0..study.conditions.len().saturating_sub(1)).map(figures).collect()
         };
         Self { differences: analysis.measures.iter().map(measure).collect() }
@@ -146,8 +145,7 @@ fn counted(study: &Study, runs: &[Run]) -> Power {
     let mut differences = Vec::new();
     for (measure, name) in study.measures.iter().enumerate() {
         for condition in 1..study.conditions.len() {
-            let kept = runs.iter().filter_map(|run| run.differences[measure][condition - 1]);
-            let figures: Vec<[f64; 3]> = kept.map(|figures| figures.map(|Exact(figure)| figure)).collect();
+            let figures: Vec<[f64; 3]> = runs.iter().filter_map(|run| run.differences[measure][condition - 1]).collect();
             let below = |place: usize| share(figures.iter().filter(|figures| figures[place] < LEVEL).count());
             let means: Vec<f64> = figures.iter().map(|figures| figures[0]).collect();
             let mean = crate::tables::mean(&means);

@@ -49,10 +49,8 @@ pub struct TrialRecord {
     /// Outcome of the task in a word.
     pub outcome: String,
     /// Time from the start of the task to its outcome \[s\].
-    #[serde(with = "crate::exact::number")]
     pub time_s: f64,
     /// Values of the measures, in the order of [`Study::measures`](crate::Study::measures); `None` for a measure without a value.
-    #[serde(with = "crate::exact::named")]
     pub values: Vec<(String, Option<f64>)>,
 }
 
@@ -142,5 +140,19 @@ impl Replayed {
         let Some(task) = measures.task(&summary) else { return Err(StudyError::damaged(&scene_file, "it has no task")) };
         let values = measures.values(summary.duration).into_iter().map(|measured| (measured.name.text(&scene), measured.value));
         Ok(Self { outcome: task.outcome.name().to_owned(), time_s: task.time.as_secs_f64(), values: values.collect() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Without `float_roundtrip`, `serde_json` reads the first number as 7.4719999999999995.
+    #[test]
+    fn numbers_of_a_record_are_read_to_the_last_bit() {
+        for number in [7.472, 0.390_536_237_206_244_3, -0.0, 5e-324, f64::MAX] {
+            let read: RoundTrip = serde_json::from_str(&serde_json::to_string(&RoundTrip { p50_s: number, p99_s: 1.0 }).unwrap()).unwrap();
+            assert_eq!(read.p50_s.to_bits(), number.to_bits(), "{number}");
+        }
     }
 }

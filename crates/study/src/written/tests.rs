@@ -109,8 +109,8 @@ fn every_change_of_a_file_is_found() {
     );
     change(
         "trials/G02-001/trial.json",
-        "\"internal_force_n\",\n      \"0.",
-        "\"internal_force_n\",\n      \"1.",
+        "\"internal_force_n\",\n      0.",
+        "\"internal_force_n\",\n      1.",
         &["G02-001: internal_force_n is 1.", "trials.parquet"],
     );
     change("trials/G01-002/scene.toml", "mass = 0.45", "mass = 0.46", &["G01-002: ", "scene.toml is not the scene of this trial"]);
