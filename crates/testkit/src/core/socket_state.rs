@@ -30,8 +30,9 @@ impl Parcel {
     /// Copies the datagram into `buffer`, cut to the length of the buffer. Returns the number of bytes copied.
     #[inline]
     pub(crate) fn copy_to(&self, buffer: &mut [u8]) -> usize {
-        let len = self.bytes.len().min(buffer.len());
-        buffer[..len].copy_from_slice(&self.bytes[..len]);
+        let bytes: &[u8] = &self.bytes;
+        let len = bytes.len().min(buffer.len());
+        buffer[..len].copy_from_slice(&bytes[..len]);
         len
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use cohaptic_units::Instant;
 use cohaptic_wan::{DropCause, Fate, Network, PacketEvent, PacketRecord, Path};
 
-use super::parcel::{Octets, Parcel};
+use super::parcel::Parcel;
 use crate::hit::Verdict;
 
 /// Event at the far end of a link. Copies are numbered as by the links of a network without access lines: 0, 1, 2.
@@ -165,6 +165,6 @@ fn flip<A>(out: &mut Out<A>, bit: u64) {
     if let Some(byte) = usize::try_from(bit / 8).ok().and_then(|place| bytes.get_mut(place)) {
         *byte ^= 1 << (bit % 8);
     }
-    out.payload.bytes = Octets::Own(bytes);
+    out.payload.bytes = bytes.into();
     out.record.damaged = true;
 }

@@ -19,7 +19,9 @@ use exits::{Out, counted};
 pub(crate) use held::{BYTE_LIMIT, Held, Where};
 pub(crate) use hitting::HitCount;
 use hitting::Hitting;
-pub(crate) use parcel::{Arrival, HasFlow, Octets, Parcel, Spare};
+#[cfg(feature = "tcp")]
+pub(crate) use parcel::Octets;
+pub(crate) use parcel::{Arrival, HasFlow, Parcel, Spare};
 pub(crate) use recording::{Recorded, Recording, Seen};
 
 use crate::access::AccessStats;
@@ -223,7 +225,7 @@ impl<A: Clone> Wire<A> {
                         // A copy with the same memory may still be under way, undamaged.
                         let mut bytes = Vec::from(std::mem::take(&mut parcel.bytes));
                         damage.apply(&mut bytes);
-                        parcel.bytes = Octets::Own(bytes);
+                        parcel.bytes = bytes.into();
                     }
                     parcel.arrival = Arrival { packet, at, marked, is_cut };
                     return Some(parcel);

@@ -51,15 +51,28 @@ impl<A> Parcel<A> {
 }
 
 /// Content of a packet.
+#[derive(Clone, Default, Debug)]
+pub(crate) struct Octets {
+    /// Number of octets. Kept beside the content, because each datagram asks for its length at seven places, and the answer depends on the kind of the content.
+    len: usize,
+    content: Content,
+}
+
 #[derive(Clone, Debug)]
-pub(crate) enum Octets {
+enum Content {
     /// Content of a datagram sent by a socket. The memory goes back to [`Spare`] after the datagram was read.
     Own(Vec<u8>),
     /// Content of every other packet.
     Shared(Bytes),
-    /// Segment between two connections of the run, and the length of its IP packet \[byte\].
+    /// Segment between two connections of the run.
     #[cfg(feature = "tcp")]
-    Segment(Box<Whole>, usize),
+    Segment(Box<Whole>),
+}
+
+impl Default for Content {
+    fn default() -> Self {
+        Self::Own(Vec::new())
+    }
 }
 
 /// Segment in its parsed form. The IP packet, with checksums, is written only for a reader of the octets: a record, a law or a damage.
@@ -81,14 +94,7 @@ impl Whole {
 #[cfg(feature = "tcp")]
 impl From<Segment<'static>> for Octets {
     fn from(segment: Segment<'static>) -> Self {
-        let length = segment.packet_length();
-        Self::Segment(Box::new(Whole { segment, packet: OnceLock::new() }), length)
-    }
-}
-
-impl Default for Octets {
-    fn default() -> Self {
-        Self::Own(Vec::new())
+        Self { len: segment.packet_length(), content: Content::Segment(Box::new(Whole { segment, packet: OnceLock::new() })) }
     }
 }
 
@@ -97,39 +103,45 @@ impl Deref for Octets {
 
     #[inline]
     fn deref(&self) -> &[u8] {
-        match self {
-            Self::Own(octets) => octets,
-            Self::Shared(octets) => octets,
+        match &self.content {
+            Content::Own(octets) => octets,
+            Content::Shared(octets) => octets,
             #[cfg(feature = "tcp")]
-            Self::Segment(whole, _) => whole.packet(),
+            Content::Segment(whole) => whole.packet(),
         }
     }
 }
 
 impl From<Bytes> for Octets {
     fn from(octets: Bytes) -> Self {
-        Self::Shared(octets)
+        Self { len: octets.len(), content: Content::Shared(octets) }
+    }
+}
+
+impl From<Vec<u8>> for Octets {
+    fn from(octets: Vec<u8>) -> Self {
+        Self { len: octets.len(), content: Content::Own(octets) }
     }
 }
 
 impl From<Octets> for Bytes {
     fn from(octets: Octets) -> Self {
-        match octets {
-            Octets::Own(octets) => octets.into(),
-            Octets::Shared(octets) => octets,
+        match octets.content {
+            Content::Own(octets) => octets.into(),
+            Content::Shared(octets) => octets,
             #[cfg(feature = "tcp")]
-            Octets::Segment(whole, _) => whole.packet().clone(),
+            Content::Segment(whole) => whole.packet().clone(),
         }
     }
 }
 
 impl From<Octets> for Vec<u8> {
     fn from(octets: Octets) -> Self {
-        match octets {
-            Octets::Own(octets) => octets,
-            Octets::Shared(octets) => octets.into(),
+        match octets.content {
+            Content::Own(octets) => octets,
+            Content::Shared(octets) => octets.into(),
             #[cfg(feature = "tcp")]
-            Octets::Segment(whole, _) => whole.packet().to_vec(),
+            Content::Segment(whole) => whole.packet().to_vec(),
         }
     }
 }
@@ -137,28 +149,38 @@ impl From<Octets> for Vec<u8> {
 impl Octets {
     /// Returns the number of octets, without writing the packet of a segment.
     #[inline]
-    pub(crate) fn len(&self) -> usize {
-        match self {
-            Self::Own(octets) => octets.len(),
-            Self::Shared(octets) => octets.len(),
-            #[cfg(feature = "tcp")]
-            Self::Segment(_, length) => *length,
+    pub(crate) const fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Returns the segment that the packet was sent as, or `None` if the packet has octets only.
+    #[cfg(feature = "tcp")]
+    pub(crate) const fn segment(&self) -> Option<&Segment<'static>> {
+        match &self.content {
+            Content::Segment(whole) => Some(&whole.segment),
+            Content::Own(_) | Content::Shared(_) => None,
         }
     }
 
     /// Replaces the content with a copy of `bytes`. Content of the kind `Own` keeps and reuses its memory.
     #[inline]
     fn refill(&mut self, bytes: &[u8]) {
-        match self {
+        match &mut self.content {
             // Packets of a flow often have one length. A copy of equal length needs no check of the capacity.
-            Self::Own(octets) if octets.len() == bytes.len() => octets.copy_from_slice(bytes),
-            Self::Own(octets) => {
+            Content::Own(octets) if octets.len() == bytes.len() => octets.copy_from_slice(bytes),
+            _ => self.refill_anew(bytes),
+        }
+    }
+
+    #[inline(never)]
+    fn refill_anew(&mut self, bytes: &[u8]) {
+        self.len = bytes.len();
+        match &mut self.content {
+            Content::Own(octets) => {
                 octets.clear();
                 octets.extend_from_slice(bytes);
             }
-            Self::Shared(_) => *self = Self::Own(bytes.to_vec()),
-            #[cfg(feature = "tcp")]
-            Self::Segment(..) => *self = Self::Own(bytes.to_vec()),
+            content => *content = Content::Own(bytes.to_vec()),
         }
     }
 }
@@ -194,13 +216,14 @@ impl<A: Default> Spare<A> {
     pub(crate) fn wrapped(&mut self, addresses: A, segment: Segment<'static>) -> Box<Parcel<A>> {
         let mut parcel = self.0.pop().unwrap_or_else(empty);
         (parcel.addresses, parcel.ecn) = (addresses, segment.ecn);
-        match &mut parcel.bytes {
+        let Octets { len, content } = &mut parcel.bytes;
+        match content {
             // A parcel that carried a segment before has a box for a segment already. The assignments reuse this memory.
-            Octets::Segment(whole, length) => {
-                *length = segment.packet_length();
+            Content::Segment(whole) => {
+                *len = segment.packet_length();
                 **whole = Whole { segment, packet: OnceLock::new() };
             }
-            Octets::Own(_) | Octets::Shared(_) => parcel.bytes = segment.into(),
+            Content::Own(_) | Content::Shared(_) => parcel.bytes = segment.into(),
         }
         parcel
     }
@@ -212,12 +235,12 @@ impl<A: Default> Spare<A> {
         if self.0.len() >= Self::MOST {
             return;
         }
-        match &mut parcel.bytes {
-            Octets::Own(octets) if octets.capacity() <= Self::LONGEST => {}
+        match &mut parcel.bytes.content {
+            Content::Own(octets) if octets.capacity() <= Self::LONGEST => {}
             // The memory of the writer is not kept, only the box.
             #[cfg(feature = "tcp")]
-            Octets::Segment(whole, _) => (whole.segment.payload, whole.packet) = (Payload::default(), OnceLock::new()),
-            Octets::Own(_) | Octets::Shared(_) => parcel.bytes = Octets::default(),
+            Content::Segment(whole) => (whole.segment.payload, whole.packet) = (Payload::default(), OnceLock::new()),
+            Content::Own(_) | Content::Shared(_) => parcel.bytes = Octets::default(),
         }
         self.0.push(parcel);
     }
@@ -251,15 +274,15 @@ mod tests {
     #[test]
     fn no_more_than_a_megabyte_is_kept() {
         let mut spare = Spare::default();
-        for bytes in [Octets::Shared(Bytes::from_static(b"not ours")), Octets::Own(Vec::with_capacity(Spare::<u8>::LONGEST + 1))] {
+        for bytes in [Octets::from(Bytes::from_static(b"not ours")), Vec::with_capacity(Spare::<u8>::LONGEST + 1).into()] {
             spare.put(parcel_of(bytes));
-            let Some(Octets::Own(kept)) = spare.0.first().map(|parcel| &parcel.bytes) else { panic!("the box is kept") };
+            let Some(Content::Own(kept)) = spare.0.first().map(|parcel| &parcel.bytes.content) else { panic!("the box is kept") };
             assert_eq!(kept.capacity(), 0);
             let filled = spare.copied(1, b"ours", Ecn::NotCapable);
             assert_eq!(&*filled.bytes, b"ours");
         }
         for _ in 0..2 * Spare::<u8>::MOST {
-            spare.put(parcel_of(Octets::Own(Vec::with_capacity(1))));
+            spare.put(parcel_of(Vec::with_capacity(1).into()));
         }
         assert_eq!(spare.0.len(), Spare::<u8>::MOST);
     }
@@ -281,7 +304,7 @@ mod tests {
             ttl: 64,
             payload: octets.to_vec().into(),
         };
-        let is_written = |parcel: &Parcel<u8>| matches!(&parcel.bytes, Octets::Segment(whole, _) if whole.packet.get().is_some());
+        let is_written = |parcel: &Parcel<u8>| matches!(&parcel.bytes.content, Content::Segment(whole) if whole.packet.get().is_some());
         let mut spare = Spare::default();
         for octets in [&b"first"[..], b"", b"longer than the first"] {
             let parcel = spare.wrapped(1, segment(octets));
@@ -290,7 +313,7 @@ mod tests {
             assert_eq!((Segment::parse(&parcel.bytes), parcel.bytes[..].len()), (Ok(segment(octets)), 52 + octets.len()));
             assert!(is_written(&parcel));
             spare.put(parcel);
-            let Octets::Segment(kept, _) = &spare.0[0].bytes else { panic!("the box is kept") };
+            let Content::Segment(kept) = &spare.0[0].bytes.content else { panic!("the box is kept") };
             assert!(kept.segment.payload.is_empty() && kept.packet.get().is_none());
         }
         assert_eq!(&*spare.copied(1, b"a datagram", Ecn::NotCapable).bytes, b"a datagram");

@@ -14,9 +14,10 @@ impl Core {
         if !self.is_up(host) {
             return Err(Lost::HostDown);
         }
-        match packet {
-            Octets::Segment(whole, _) => self.take_segment(host, &whole.segment, marked),
-            damaged @ (Octets::Own(_) | Octets::Shared(_)) => self.take_segment(host, &Segment::parse(damaged).map_err(|_| Lost::Checksum)?, marked),
+        match packet.segment() {
+            Some(segment) => self.take_segment(host, segment, marked),
+            // A packet that a link has damaged.
+            None => self.take_segment(host, &Segment::parse(packet).map_err(|_| Lost::Checksum)?, marked),
         }
     }
 
