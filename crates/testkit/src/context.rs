@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::io;
+use std::mem::ManuallyDrop;
 use std::panic::Location;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -13,7 +14,8 @@ use crate::current;
 use crate::task::Tasks;
 
 thread_local! {
-    static RUNNING: RefCell<Option<Running>> = const { RefCell::new(None) };
+    /// `ManuallyDrop`, because a thread-local value that needs no drop is accessed without a check whether it was dropped. [`Entered`] empties the value.
+    static RUNNING: RefCell<ManuallyDrop<Option<Running>>> = const { RefCell::new(ManuallyDrop::new(None)) };
 }
 
 /// Running test bed.
@@ -43,7 +45,7 @@ impl Running {
             }
             let Self { shared, tasks } = self.clone();
             current::begin(shared.run(), Rc::new(move || tasks.current(shared.names())));
-            *running = Some(self);
+            **running = Some(self);
         });
         Entered
     }
@@ -52,7 +54,7 @@ impl Running {
 impl Drop for Entered {
     fn drop(&mut self) {
         // Dropped after the borrow and after `current::end`: the destructors of the run may look for a running test bed, and must find none.
-        let left = RUNNING.with_borrow_mut(Option::take);
+        let left = RUNNING.with_borrow_mut(|running| running.take());
         current::end();
         drop(left);
     }
@@ -60,7 +62,7 @@ impl Drop for Entered {
 
 /// Returns the running test bed of this thread.
 pub(crate) fn running() -> Option<Running> {
-    RUNNING.with_borrow(Clone::clone)
+    RUNNING.with_borrow(|running| (**running).clone())
 }
 
 /// Returns the state of the running test bed of this thread.
@@ -90,7 +92,7 @@ pub(crate) fn expect_running(what: &str) -> Running {
 /// If no test bed runs on this thread.
 #[expect(clippy::panic, reason = "a misuse, and the way out")]
 pub(crate) fn ask<T>(what: &str, question: impl FnOnce(&Arc<Shared>) -> T) -> T {
-    RUNNING.with_borrow(|running| match running {
+    RUNNING.with_borrow(|running| match &**running {
         Some(running) => question(&running.shared),
         None => panic!("{}", outside_text(what)),
     })

@@ -63,7 +63,7 @@ pub struct EventQueue<E> {
     far: BinaryHeap<Reverse<Entry>>,
     /// Lower bound of the instants of all events in `ring` and `far`. Ticks before this instant need no search for the next bucket.
     quiet_until: Instant,
-    /// Number of pending events.
+    /// Number of events in the calendar, 0 while the queue is a ring.
     len: usize,
     /// Width of a bucket as an exponent: a bucket spans 2^`width` ns.
     width: u32,
@@ -118,19 +118,18 @@ impl<E: Event> EventQueue<E> {
     /// Returns the number of pending events.
     #[must_use]
     pub const fn len(&self) -> usize {
-        self.len
+        if self.in_order { self.ordered.len() } else { self.len }
     }
 
     /// Returns whether no event is pending.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
-        self.len == 0
+        self.len() == 0
     }
 
     /// Adds an event. An event may lie before events already taken, and is then taken before all later events.
     #[inline(always)]
     pub fn push(&mut self, event: E) {
-        self.len += 1;
         if self.in_order {
             if self.ordered.back().is_none_or(|last| last.key() <= event.key()) {
                 self.ordered.push(|| event);
@@ -153,7 +152,6 @@ impl<E: Event> EventQueue<E> {
     /// the event is at least the key of [`EventQueue::last_in_order`].
     #[inline(always)]
     pub(crate) fn push_made(&mut self, at: Instant, follows: bool, make: impl FnOnce() -> E) {
-        self.len += 1;
         if self.in_order {
             if follows {
                 return self.ordered.push(make);
@@ -161,6 +159,7 @@ impl<E: Event> EventQueue<E> {
             self.become_calendar();
         }
         let place = self.slab.store(make);
+        self.len += 1;
         self.push_entry((at, place));
     }
 
@@ -171,7 +170,6 @@ impl<E: Event> EventQueue<E> {
             if self.ordered.front()?.at() > now {
                 return None;
             }
-            self.len -= 1;
             return self.ordered.pop();
         }
         // The front is tried first, because a search for the next bucket is needed once per bucket only.
@@ -191,7 +189,6 @@ impl<E: Event> EventQueue<E> {
     pub(crate) fn take_due<T>(&mut self, now: Instant, take: impl FnOnce(E) -> T) -> Option<T> {
         let place = if self.in_order {
             self.ordered.front().filter(|first| first.at() <= now)?;
-            self.len -= 1;
             self.ordered.pass_front()?
         } else {
             if self.front.front().is_none_or(|first| first.0 > now) && !self.advance(now) {
@@ -250,6 +247,7 @@ impl<E: Event> EventQueue<E> {
     fn push_calendar(&mut self, event: E) {
         let at = event.at();
         let place = self.slab.store(|| event);
+        self.len += 1;
         self.push_entry((at, place));
     }
 

@@ -22,6 +22,9 @@ pub struct Ring<T> {
     places: Vec<Option<T>>,
     /// Index of the slot of the first value.
     first: usize,
+    /// Index of the slot of the last value: one before `first`, wrapped, in an empty ring. Kept because each value of the event queue is compared with the
+    /// last value before it is pushed.
+    last: usize,
     /// Number of values.
     len: usize,
 }
@@ -36,7 +39,7 @@ impl<T> Ring<T> {
     /// Returns an empty ring without allocated memory.
     #[must_use]
     pub const fn new() -> Self {
-        Self { places: Vec::new(), first: 0, len: 0 }
+        Self { places: Vec::new(), first: 0, last: usize::MAX, len: 0 }
     }
 
     /// Returns the number of values.
@@ -62,9 +65,8 @@ impl<T> Ring<T> {
     #[must_use]
     #[inline(always)]
     pub(crate) fn back(&self) -> Option<&T> {
-        let last = self.len.checked_sub(1)?;
-        // `len` is above zero, so there are slots, and the mask does not underflow.
-        self.places[(self.first + last) & (self.places.len() - 1)].as_ref()
+        // The slot before the first value is free in an empty ring, and beyond all slots if there are none.
+        self.places.get(self.last)?.as_ref()
     }
 
     /// Adds a value after the last value. `make` constructs the value.
@@ -73,12 +75,13 @@ impl<T> Ring<T> {
         if self.len == self.places.len() {
             self.grow();
         }
-        let place = (self.first + self.len) & (self.places.len() - 1);
-        let place = &mut self.places[place];
+        let last = self.last.wrapping_add(1) & (self.places.len() - 1);
+        let place = &mut self.places[last];
         // Always true: after `grow` the slot after the last value is free. With the test the compiler knows of no old value to drop, so the value can be
         // constructed in the slot.
         if place.is_none() {
             *place = Some(make());
+            self.last = last;
             self.len += 1;
         }
     }
@@ -139,6 +142,7 @@ impl<T> Ring<T> {
         // The values are rotated to begin at slot 0, so the new slots lie after the last value.
         self.places.rotate_left(self.first);
         self.first = 0;
+        self.last = self.places.len().wrapping_sub(1);
         let places = (2 * self.places.len()).max(4);
         self.places.resize_with(places, || None);
     }

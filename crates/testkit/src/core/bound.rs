@@ -35,9 +35,9 @@ impl Port {
 impl Bound {
     /// Returns the sockets of `port`, in the order of binding.
     #[inline]
-    pub(super) fn at(&self, port: Port) -> impl Iterator<Item = SocketId> {
-        let first = self.0.partition_point(|(bound, _)| *bound < port);
-        self.0[first..].iter().take_while(move |(bound, _)| *bound == port).map(|(_, socket)| *socket)
+    pub(super) fn at(&self, port: Port) -> &[(Port, SocketId)] {
+        let from = &self.0[self.0.partition_point(|(bound, _)| *bound < port)..];
+        &from[..from.iter().take_while(|(bound, _)| *bound == port).count()]
     }
 
     /// Adds a socket after all sockets of the same port.
@@ -49,7 +49,7 @@ impl Bound {
     /// Removes a socket. Does nothing if the socket is not there, because its host crashed in between and forgot all its sockets.
     pub(super) fn remove(&mut self, port: Port, socket: SocketId) {
         let first = self.0.partition_point(|(bound, _)| *bound < port);
-        let place = self.at(port).position(|bound| bound == socket);
+        let place = self.at(port).iter().position(|(_, bound)| *bound == socket);
         if let Some(place) = place {
             self.0.remove(first + place);
         }
@@ -68,7 +68,7 @@ mod tests {
         for (port, socket) in given {
             bound.add(port, SocketId(socket));
         }
-        let at = |bound: &Bound, port| bound.at(port).map(|socket| socket.0).collect::<Vec<_>>();
+        let at = |bound: &Bound, port| bound.at(port).iter().map(|(_, socket)| socket.0).collect::<Vec<_>>();
         assert_eq!(at(&bound, port(false, 7)), [2, 3, 5]);
         bound.remove(port(false, 7), SocketId(3));
         // The second call finds the socket gone and does nothing.

@@ -175,7 +175,7 @@ impl Core {
     #[cold]
     fn fail_for(&self, socket: SocketName) {
         let task = current::task().map_or_else(String::new, |task| format!(", used by {task}"));
-        self.wire.held.fail(format_args!("{}{task}", socket.words(&self.plan)));
+        self.wire.held.fail(format_args!("{}{task}", socket.words(&self.plan)), self.sockets.held());
     }
 
     /// Returns the source of random bytes for the programs of `host`, or for programs of no host.

@@ -10,8 +10,8 @@ use super::socket_state::SocketState;
 use super::{Core, Ends, Kind, Parcel, SocketId};
 use crate::address::Addresses;
 use crate::errno::Errno;
-use crate::trace::{Lost, PacketName};
-use crate::wire::Arrival;
+use crate::trace::Lost;
+use crate::wire::Held;
 
 /// Longest datagram over IPv4 and over IPv6 \[bytes\].
 const LONGEST: [usize; 2] = [65_507, 65_527];
@@ -58,25 +58,44 @@ impl Core {
             return Err(self.error_of(id));
         }
         let host = socket.host;
-        let to = match to {
-            Some(to) => socket.wire_form(*to)?,
-            None => match socket.peer {
-                Some(peer) => peer,
-                None => return Errno::NoDestination.fail(),
-            },
+        let Some(to) = to.or(socket.peer.as_ref()) else { return Errno::NoDestination.fail() };
+        // The address is read in its place: a copy takes more instructions than all that is done with the address.
+        let other_form;
+        let to = if socket.is_wire_form(to) {
+            to
+        } else {
+            other_form = socket.wire_form(*to)?;
+            &other_form
         };
-        if to.port() == 0 {
+        let (to_port, is_six) = (to.port(), to.is_ipv6());
+        if to_port == 0 {
             return Errno::InvalidInput.fail();
         }
-        if bytes.len() > LONGEST[usize::from(to.is_ipv6())] {
+        if bytes.len() > LONGEST[usize::from(is_six)] {
             return Errno::TooLong.fail();
         }
-        let Route { from, to: number, receivers } = self.route(socket, &to)?;
-        let addresses = Ends::of([from, number], [socket.port.number(), to.port()], to.is_ipv6(), Kind::Datagram);
+        let Route { from, to: number, receivers } = self.route(socket, to)?;
+        let addresses = Ends::of([from, number], [socket.port.number(), to_port], is_six, Kind::Datagram);
+        match receivers {
+            Receivers::One(receiver) if receiver != host => {
+                let parcel = self.spare.copied(addresses, bytes, ecn);
+                self.offer(Path { from: host, to: receiver }, parcel);
+            }
+            receivers => self.send_within(host, receivers, addresses, outgoing),
+        }
+        // The check comes after the sending: a packet that arrives at once and is read or lost is not held any more.
+        if self.wire.held.is_too_much() {
+            self.fail_for(self.sockets.get(id).name());
+        }
+        Ok(())
+    }
+
+    /// Sends a datagram to its own host, to all hosts, or to nobody.
+    #[inline(never)]
+    fn send_within(&mut self, host: NodeId, receivers: Receivers, addresses: Ends, Outgoing { bytes, ecn, .. }: Outgoing<'_>) {
         let parcel = self.spare.copied(addresses, bytes, ecn);
         match receivers {
-            Receivers::One(receiver) if receiver == host => self.hand_over(host, parcel),
-            Receivers::One(receiver) => self.offer(Path { from: host, to: receiver }, parcel),
+            Receivers::One(_) => self.hand_over(host, parcel),
             Receivers::All => {
                 // The receiver of the link of a loopback is the sender.
                 let paths = (0..self.hosts.len()).map(|other| Path { from: host, to: NodeId::new(other) });
@@ -87,13 +106,8 @@ impl Core {
                 // Sockets of the sender hear a broadcast as well, over loopback.
                 self.hand_over(host, parcel);
             }
-            Receivers::Nobody => {}
+            Receivers::Nobody => self.spare.put(parcel),
         }
-        // The check comes after the sending: a packet that arrives at once and is read or lost is not held any more.
-        if self.wire.held.is_too_much() {
-            self.fail_for(self.sockets.get(id).name());
-        }
-        Ok(())
     }
 
     /// Returns the way of a datagram of `socket` to the address `to`, which the socket can send to.
@@ -104,11 +118,21 @@ impl Core {
     #[inline(always)]
     pub(super) fn route(&self, socket: &SocketState, to: &SocketAddr) -> io::Result<Route> {
         // An address of a host belongs to no other kind of address. Most datagrams go to such an address, so the other kinds are tried only afterwards.
-        let mut number = Addresses::short(to.ip());
-        let receivers = match self.plan.owner_of(number, to.is_ipv6()) {
-            Some(owner) => Receivers::One(owner),
-            None => self.other_receivers(socket.host, to, &mut number)?,
+        let (number, is_six) = (Addresses::short(to.ip()), to.is_ipv6());
+        let Some(owner) = self.plan.owner_of(number, is_six) else { return self.other_route(socket, to, number) };
+        let from = match socket.at {
+            // No host has an address of loopback, whose source would be another one.
+            None => self.plan.short(socket.host, is_six),
+            Some(at) => self.check_source(socket.host, at, number, to).map(|()| at)?,
         };
+        Ok(Route { from, to: number, receivers: Receivers::One(owner) })
+    }
+
+    /// Like [`Core::route`], for the address `number` that no host has.
+    #[inline(never)]
+    fn other_route(&self, socket: &SocketState, to: &SocketAddr, number: u32) -> io::Result<Route> {
+        let mut number = number;
+        let receivers = self.other_receivers(socket.host, to, &mut number)?;
         let from = self.source(socket.host, socket.at, number, to)?;
         if matches!(receivers, Receivers::All) && !socket.may_broadcast {
             return Errno::PermissionDenied.fail();
@@ -118,7 +142,6 @@ impl Core {
 
     /// Returns the receivers of a datagram from `host` to an address that no host has. Sets `number` to the address on the packet, which differs for the
     /// unspecified address.
-    #[inline(never)]
     fn other_receivers(&self, host: NodeId, to: &SocketAddr, number: &mut u32) -> io::Result<Receivers> {
         let ip = to.ip();
         if ip.is_multicast() {
@@ -143,7 +166,6 @@ impl Core {
 
     /// Returns the source address of a socket that sends to the address `number`, given by the program as `to`. `at` is the address at which the socket is
     /// bound, `None` for all addresses. `at`, `number` and the result are as [`Addresses::short`].
-    #[inline]
     pub(super) fn source(&self, host: NodeId, at: Option<u32>, number: u32, to: &SocketAddr) -> io::Result<u32> {
         match at {
             None => Ok(self.source_to(host, number, to.is_ipv6())),
@@ -153,7 +175,6 @@ impl Core {
 
     /// Returns the source address of a socket that is bound to no address and sends to the address `number`. As with Linux, 127.0.0.1 is the source also for
     /// the other addresses of loopback.
-    #[inline]
     pub(super) fn source_to(&self, host: NodeId, number: u32, is_six: bool) -> u32 {
         if Addresses::is_loopback(number, is_six) { Addresses::LOOPBACK[usize::from(is_six)] } else { self.plan.short(host, is_six) }
     }
@@ -193,11 +214,19 @@ impl Core {
     pub(super) fn take_arrivals(&mut self) {
         loop {
             while let Some(parcel) = self.wire.poll() {
-                // The parts are copied one by one: a processor that loads a whole value shortly after storing the parts waits for the stores.
-                let Arrival { packet: PacketName { path: Path { from, to }, sequence, copy }, at, is_cut, .. } = parcel.arrival;
+                // The name is copied only where it is recorded: parts that were stored a moment ago are slow to load as a whole.
+                let recorded = self.wire.recording().traces.then(|| (parcel.arrival.packet, parcel.arrival.at));
+                let Path { from, to } = parcel.arrival.packet.path;
                 let path = Path { from, to: self.receiver(Path { from, to }) };
-                let end = if is_cut { Err(Lost::Cut) } else { self.arrive(path, parcel) };
-                self.wire.ends(PacketName { path: Path { from, to }, sequence, copy }, at, end);
+                let end = if parcel.arrival.is_cut {
+                    self.wire.held.remove(Held::cost(parcel.bytes.len()));
+                    Err(Lost::Cut)
+                } else {
+                    self.arrive(path, parcel)
+                };
+                if let Some((packet, at)) = recorded {
+                    self.wire.ends(packet, at, end);
+                }
             }
             #[cfg(feature = "tcp")]
             // A packet of loopback may let packets leave over links without delay, so the links are polled again.
@@ -225,6 +254,7 @@ impl Core {
             return self.offer(path, parcel);
         }
         (parcel.arrival.at, parcel.arrival.marked) = (self.now(), false);
+        self.wire.held.add(Held::cost(parcel.bytes.len()));
         // Fates of packets are recorded for links only. Loopback is not part of the network.
         let _ = self.arrive(Path { from: host, to: host }, parcel);
     }
@@ -232,20 +262,28 @@ impl Core {
     /// Delivers an arrived packet to its socket, or returns why the packet is lost.
     #[inline(always)]
     fn arrive(&mut self, path: Path, parcel: Box<Parcel>) -> Result<(), Lost> {
+        if parcel.addresses.kind != Kind::Datagram {
+            return self.arrive_other(path, parcel);
+        }
+        let Some(id) = self.socket_for(path.to, &parcel.addresses) else { return Err(self.lose(path, &parcel)) };
+        self.sockets.get_mut(id).keep(parcel, &mut self.wire.held, &mut self.woken)
+    }
+
+    /// Like [`Core::arrive`], for a packet that is no datagram.
+    #[inline(never)]
+    fn arrive_other(&mut self, path: Path, parcel: Box<Parcel>) -> Result<(), Lost> {
         #[cfg(feature = "tcp")]
         if parcel.addresses.kind == Kind::Segment {
+            self.wire.held.remove(Held::cost(parcel.bytes.len()));
             let end = self.arrive_segment(path.to, &parcel.bytes, parcel.arrival.marked);
             self.spare.put(parcel);
             return end;
         }
         let Some(id) = self.socket_for(path.to, &parcel.addresses) else { return Err(self.lose(path, &parcel)) };
-        let socket = self.sockets.get_mut(id);
+        self.wire.held.remove(Held::cost(parcel.bytes.len()));
         // As with Linux, only a connected socket gets the error. An unconnected socket could not tell which of its peers refused.
-        if parcel.addresses.kind == Kind::Unreachable {
-            socket.refuse(parcel.addresses.from(), &mut self.woken);
-            return Ok(());
-        }
-        socket.keep(parcel, &mut self.wire.held, &mut self.woken)
+        self.sockets.get_mut(id).refuse(parcel.addresses.from(), &mut self.woken);
+        Ok(())
     }
 
     /// Returns the socket of `host` that receives the packet. A socket connected to the sender comes before an unconnected socket, then a socket bound to the
@@ -255,17 +293,16 @@ impl Core {
         if !self.has_address(host, ends) {
             return None;
         }
-        let mut best = None;
-        for id in self.hosts[host.index()].bound.at(ends.port()) {
-            let socket = self.sockets.get(id);
-            let fits = socket.at.is_none_or(|at| at == ends.to) && socket.peer.is_none_or(|peer| peer == ends.from());
-            let rank = (socket.peer.is_some(), socket.at.is_some());
-            // `at` keeps the order of binding, so that `>=` prefers the socket bound last among equals.
-            if fits && best.is_none_or(|(highest, _)| rank >= highest) {
-                best = Some((rank, id));
+        match self.hosts[host.index()].bound.at(ends.port()) {
+            [] => None,
+            // Most ports have one socket, which needs no comparison with others.
+            [(_, id)] => self.sockets.get(*id).hears(ends).then_some(*id),
+            several => {
+                let rank = |(_, id): &&(_, SocketId)| (self.sockets.get(*id).peer.is_some(), self.sockets.get(*id).at.is_some());
+                // `several` has the order of binding, and of equal ranks `max_by_key` returns the last.
+                several.iter().filter(|(_, id)| self.sockets.get(*id).hears(ends)).max_by_key(rank).map(|(_, id)| *id)
             }
         }
-        best.map(|(_, id)| id)
     }
 
     /// Returns whether `host` has the address to which the packet goes.
@@ -277,6 +314,7 @@ impl Core {
     /// Returns why a packet without a receiving socket is lost. A host that is down has no sockets. If the host is up, the sender of a datagram is told.
     #[inline(never)]
     fn lose(&mut self, path: Path, parcel: &Parcel) -> Lost {
+        self.wire.held.remove(Held::cost(parcel.bytes.len()));
         let ends = &parcel.addresses;
         if !self.is_up(path.to) {
             return Lost::HostDown;

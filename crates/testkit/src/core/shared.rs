@@ -11,7 +11,6 @@ use std::cell::{Cell, RefCell};
 use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
-use std::task::Waker;
 use std::time::Duration;
 
 use cohaptic_units::Instant;
@@ -213,7 +212,7 @@ impl Shared {
             drop(visit);
         }
         if let Some(woken) = woken {
-            wake(woken);
+            woken.wake();
         }
         outcome
     }
@@ -281,12 +280,6 @@ impl Shared {
         }
         Stay(self)
     }
-}
-
-/// Wakes the tasks that could not be woken during the access to the state.
-#[cold]
-fn wake(woken: Vec<Waker>) {
-    woken.into_iter().for_each(Waker::wake);
 }
 
 /// Guard of one access to the state of the run. The state stays on this thread until the guard is dropped.

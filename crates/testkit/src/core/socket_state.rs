@@ -8,11 +8,11 @@ use cohaptic_wan::{NodeId, Ring};
 
 use super::bound::Port;
 use super::waking::{Waiters, Woken};
-use super::{Parcel, SocketName, mapped, unmapped};
+use super::{Ends, Parcel, SocketName, mapped, unmapped};
 use crate::address::Addresses;
 use crate::errno::Errno;
 use crate::trace::Lost;
-use crate::wire::{Held, Where};
+use crate::wire::Held;
 
 /// Access of the readers to a received datagram.
 impl Parcel {
@@ -61,7 +61,8 @@ pub(crate) struct SocketState {
 }
 
 impl SocketState {
-    /// Puts a datagram into the buffer. `all` counts the bytes of the whole run. A datagram whose memory does not fit is lost, unless the buffer is empty.
+    /// Puts a datagram into the buffer. `all` counts the bytes of the whole run, of the datagram too. A datagram whose memory does not fit is lost, unless the
+    /// buffer is empty.
     #[inline(always)]
     pub(super) fn keep(&mut self, mut parcel: Box<Parcel>, all: &mut Held, woken: &mut Woken) -> Result<(), Lost> {
         let (len, is_six) = (parcel.bytes.len(), parcel.addresses.is_six);
@@ -69,19 +70,24 @@ impl SocketState {
         let memory = self.memory + memory_of(len, is_six);
         // An empty buffer takes a datagram of any length: otherwise a program with a small buffer would never receive a long datagram.
         if memory > self.room && self.memory > 0 {
+            all.remove(Held::cost(len));
             return Err(Lost::BufferFull);
         }
         self.memory = memory;
         self.held += len;
-        all.add(Where::Buffers, Held::cost(len));
         self.inbox.push(|| parcel);
         self.readers.wake(woken);
         Ok(())
     }
 
+    /// Returns the bytes of the datagrams in the buffer, as [`Held`] counts them.
+    pub(super) const fn cost(&self) -> u64 {
+        self.held as u64 + self.inbox.len() as u64 * Held::cost(0)
+    }
+
     /// Drops all datagrams in the buffer.
     pub(super) fn clear(&mut self, all: &mut Held) {
-        all.remove(Where::Buffers, self.held as u64 + self.inbox.len() as u64 * Held::cost(0));
+        all.remove(self.cost());
         self.inbox.clear();
         (self.held, self.memory) = (0, 0);
     }
@@ -124,23 +130,26 @@ impl SocketState {
         if self.port.is_six() { mapped(address) } else { address }
     }
 
+    /// Returns whether [`SocketState::wire_form`] surely returns the same address.
+    #[inline]
+    pub(super) const fn is_wire_form(&self, to: &SocketAddr) -> bool {
+        to.is_ipv4() && !self.port.is_six()
+    }
+
+    /// Returns whether the socket receives a datagram between these ends, which goes to the port and the host of the socket.
+    #[inline]
+    pub(super) fn hears(&self, ends: &Ends) -> bool {
+        self.at.is_none_or(|at| at == ends.to) && self.peer.is_none_or(|peer| peer == ends.from())
+    }
+
     /// Returns the address of the other end of a packet of this socket. A mapped address such as `::ffff:10.0.0.1` becomes an address of IPv4, because packets
     /// to such an address travel over IPv4.
     ///
     /// # Errors
     ///
     /// If the socket cannot send packets of the version of IP of `to`.
-    #[inline]
-    pub(super) fn wire_form(&self, to: SocketAddr) -> io::Result<SocketAddr> {
-        // The common case, kept short: an address of IPv4 for a socket of IPv4 needs no conversion.
-        if to.is_ipv6() == self.port.is_six() && !to.is_ipv6() {
-            return Ok(to);
-        }
-        self.other_form(to)
-    }
-
     #[inline(never)]
-    fn other_form(&self, to: SocketAddr) -> io::Result<SocketAddr> {
+    pub(super) fn wire_form(&self, to: SocketAddr) -> io::Result<SocketAddr> {
         let form = if self.port.is_six() { unmapped(to) } else { to };
         if form.is_ipv6() == self.port.is_six() || self.is_dual() {
             return Ok(form);

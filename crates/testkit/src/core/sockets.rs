@@ -14,7 +14,7 @@ use super::waking::Waiters;
 use super::{Core, Parcel};
 use crate::address::Addresses;
 use crate::errno::Errno;
-use crate::wire::{Held, Where};
+use crate::wire::Held;
 
 /// Sockets that have not been closed.
 #[derive(Debug, Default)]
@@ -43,6 +43,11 @@ impl Sockets {
     #[inline]
     pub(super) fn get_mut(&mut self, id: SocketId) -> &mut SocketState {
         self.places[id.0].as_mut().expect("a socket is open as long as its number is held")
+    }
+
+    /// Returns the bytes in the buffers of all sockets, as [`Held`] counts them.
+    pub(super) fn held(&self) -> u64 {
+        self.places.iter().flatten().map(|socket| socket.cost()).sum()
     }
 
     pub(super) fn all_of(&mut self, host: NodeId) -> impl Iterator<Item = &mut SocketState> {
@@ -85,8 +90,9 @@ impl Core {
         // A socket bound to all addresses conflicts with every socket of the port. At `[::]` these are the sockets of both versions of IP.
         let is_taken = bound
             .at(Port::new(ip.is_ipv6(), port))
-            .any(|id| ip.is_unspecified() || self.sockets.get(id).at.is_none_or(|other| other == Addresses::short(ip)));
-        is_taken || ip == IpAddr::V6(Ipv6Addr::UNSPECIFIED) && bound.at(Port::new(false, port)).next().is_some()
+            .iter()
+            .any(|(_, id)| ip.is_unspecified() || self.sockets.get(*id).at.is_none_or(|other| other == Addresses::short(ip)));
+        is_taken || ip == IpAddr::V6(Ipv6Addr::UNSPECIFIED) && !bound.at(Port::new(false, port)).is_empty()
     }
 
     fn free_port(&mut self, host: NodeId, ip: IpAddr) -> io::Result<u16> {
@@ -219,7 +225,7 @@ impl Core {
         let len = datagram.bytes.len();
         socket.held -= len;
         socket.memory -= memory_of(len, datagram.addresses.is_six);
-        self.wire.held.remove(Where::Buffers, Held::cost(len));
+        self.wire.held.remove(Held::cost(len));
         // `look` returns no reference into the datagram, so the memory of the datagram is used again at once.
         let seen = look(&datagram);
         self.spare.put(datagram);

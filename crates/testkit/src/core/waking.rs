@@ -129,8 +129,23 @@ impl Woken {
 
     /// Takes the wakers to call after the borrow, or returns `None` if there are none.
     #[inline]
-    pub(super) fn take(&mut self) -> Option<Vec<Waker>> {
-        // Most borrows wake no foreign task, and cost only this check.
-        (!self.later.is_empty()).then(|| std::mem::take(&mut self.later))
+    pub(super) fn take(&mut self) -> Option<Box<ToWake>> {
+        if self.later.is_empty() { None } else { Some(self.take_later()) }
+    }
+
+    #[inline(never)]
+    fn take_later(&mut self) -> Box<ToWake> {
+        Box::new(ToWake(std::mem::take(&mut self.later)))
+    }
+}
+
+/// Wakers to call, now that the borrow of the state has ended. Boxed by [`Woken::take`], because nearly every question to the state passes nothing on, and a
+/// pointer of nothing stays in a register.
+pub(super) struct ToWake(Vec<Waker>);
+
+impl ToWake {
+    #[cold]
+    pub(super) fn wake(self: Box<Self>) {
+        self.0.into_iter().for_each(Waker::wake);
     }
 }

@@ -8,7 +8,7 @@ use super::address::{addresses, place_of};
 use super::run::{Does, Ports};
 use super::{NodeRun, Packet, Transmit};
 use crate::trace::{Happening, Lost};
-use crate::wire::{Arrival, Held, Parcel, Where};
+use crate::wire::{Arrival, Held, Parcel};
 
 impl NodeRun {
     /// Lets the events of the instant `at` happen.
@@ -79,6 +79,7 @@ impl NodeRun {
         let path = Path { from, to };
         if to == from {
             // The packet does not leave the node, so it meets no link.
+            self.wire.held.add(Held::cost(parcel.bytes.len()));
             self.arrive(path, parcel, false);
         } else {
             match self.wire.offer(path, Box::new(parcel)) {
@@ -89,7 +90,8 @@ impl NodeRun {
             }
         }
         if self.wire.held.is_too_much() {
-            self.wire.held.fail(format_args!("node `{}`", self.names[from.index()]));
+            let handed_over = self.arrived.iter().map(|(_, packet)| Held::cost(packet.bytes.len())).sum();
+            self.wire.held.fail(format_args!("node `{}`", self.names[from.index()]), handed_over);
         }
     }
 
@@ -98,22 +100,24 @@ impl NodeRun {
         while let Some(parcel) = self.wire.poll() {
             let Arrival { packet, at, marked, is_cut } = parcel.arrival;
             let Path { from, to } = packet.path;
-            if is_cut {
+            let why = if is_cut {
                 self.counts[from.index()].cut += 1;
-                self.wire.ends(packet, at, Err(Lost::Cut));
+                Lost::Cut
             } else if !self.up[to.index()] {
                 self.counts[to.index()].while_down += 1;
-                self.wire.ends(packet, at, Err(Lost::HostDown));
+                Lost::HostDown
             } else {
                 self.wire.ends(packet, at, Ok(()));
                 self.arrive(packet.path, *parcel, marked);
-            }
+                continue;
+            };
+            self.wire.held.remove(Held::cost(parcel.bytes.len()));
+            self.wire.ends(packet, at, Err(why));
         }
     }
 
     fn arrive(&mut self, Path { from, to }: Path, parcel: Parcel<Ports>, marked: bool) {
         let Parcel { addresses: ports, bytes, .. } = parcel;
-        self.wire.held.add(Where::Buffers, Held::cost(bytes.len()));
         let address = |node: NodeId, port: u16| {
             let addresses = addresses(node.index());
             let ip = if ports.is_six { addresses.v6.into() } else { addresses.v4.into() };
@@ -126,7 +130,7 @@ impl NodeRun {
     pub(super) fn hand_over(&mut self) {
         // Over links without delay `ask` appends packets to `arrived`. The loop hands these packets over at the same instant.
         while let Some((to, packet)) = self.arrived.pop_front() {
-            self.wire.held.remove(Where::Buffers, Held::cost(packet.bytes.len()));
+            self.wire.held.remove(Held::cost(packet.bytes.len()));
             self.count(Does::Receives, to);
             self.counts[to.index()].arrived += 1;
             if let Some(node) = &mut self.nodes[to.index()] {

@@ -4,6 +4,7 @@
 //! one instant packets arrive first, then timers go off, in the order of setting.
 
 use std::cell::{Cell, RefCell};
+use std::mem::ManuallyDrop;
 use std::ops::Deref;
 use std::panic::Location;
 use std::rc::Rc;
@@ -23,7 +24,11 @@ use crate::watch::Watched;
 use crate::wire::Recorded;
 
 thread_local! {
-    static HERE: Here = const { Here { executor: Cell::new(0), ready: RefCell::new(Vec::new()), main: RefCell::new(None), waits: Cell::new(false) } };
+    /// `ManuallyDrop`, because a thread-local value that needs no drop is accessed without a check whether it was dropped. [`Inner`] empties the value when the
+    /// executor is dropped.
+    static HERE: ManuallyDrop<Here> = const {
+        ManuallyDrop::new(Here { executor: Cell::new(0), ready: RefCell::new(Vec::new()), main: RefCell::new(None), waits: Cell::new(false) })
+    };
 }
 
 /// State of a thread for the executor that runs on the thread.
@@ -41,10 +46,23 @@ struct Here {
 impl Here {
     #[inline]
     fn push(&self, number: usize) {
-        self.ready.borrow_mut().push(number);
+        let mut ready = self.ready.borrow_mut();
+        // Growing is a call of its own, so that waking saves no registers for it.
+        if ready.len() == ready.capacity() {
+            drop(ready);
+            return self.push_growing(number);
+        }
+        ready.push(number);
+        drop(ready);
         if self.waits.get() {
             self.wake_main();
         }
+    }
+
+    #[inline(never)]
+    fn push_growing(&self, number: usize) {
+        self.ready.borrow_mut().reserve(1);
+        self.push(number);
     }
 
     #[inline(never)]
@@ -100,18 +118,16 @@ impl Wake for Place {
 
     #[inline]
     fn wake_by_ref(self: &Arc<Self>) {
-        let is_here = HERE.try_with(|here| {
-            let is_here = here.executor.get() == self.executor;
+        HERE.with(|here| {
+            if here.executor.get() != self.executor {
+                return self.wake_elsewhere();
+            }
             // Another thread may set the mark between these two lines. The task is then polled once too often; no wake-up is lost.
-            if is_here && !self.is_queued.load(Ordering::Relaxed) {
+            if !self.is_queued.load(Ordering::Relaxed) {
                 self.is_queued.store(true, Ordering::Relaxed);
                 here.push(self.number);
             }
-            is_here
         });
-        if is_here != Ok(true) {
-            self.wake_elsewhere();
-        }
     }
 }
 
@@ -181,6 +197,20 @@ impl Deref for Executor {
 
     fn deref(&self) -> &Inner {
         &self.0
+    }
+}
+
+impl Drop for Inner {
+    fn drop(&mut self) {
+        HERE.with(|here| {
+            // A later executor may have taken the place of this one.
+            if here.executor.get() == self.number {
+                here.executor.set(0);
+                here.waits.set(false);
+                // Both are dropped without a borrow: a foreign waker may have a destructor that wakes.
+                drop((here.ready.take(), here.main.take()));
+            }
+        });
     }
 }
 

@@ -16,7 +16,7 @@ use cohaptic_units::Instant;
 use cohaptic_wan::{AccessLine, DropCause, Fate, LinkModel, LinkStats, Network, NetworkConfig, NodeId, PacketInfo, Path};
 
 use exits::{Out, counted};
-pub(crate) use held::{BYTE_LIMIT, Held, Where};
+pub(crate) use held::{BYTE_LIMIT, Held};
 pub(crate) use hitting::HitCount;
 use hitting::Hitting;
 #[cfg(feature = "tcp")]
@@ -51,7 +51,7 @@ pub(crate) struct Wire<A> {
     cut: BTreeSet<Path>,
     /// Bytes that the run holds, on links and at sockets and nodes.
     pub(crate) held: Held,
-    /// `true` if packets are hit by laws or recorded.
+    /// Whether packets are hit by laws, recorded, or stopped by cuts.
     is_watched: bool,
     /// State of the laws; `None` without laws.
     hitting: Option<Box<Hitting<A>>>,
@@ -80,26 +80,31 @@ impl<A: HasFlow + Clone + Send + Sync + 'static> Wire<A> {
         }
         let (hitting, network) = Hitting::new(&settings.laws, names, seed, network);
         let recording = Recording::new(Arc::clone(names), settings);
-        // Without laws and without a record, `offer` and `poll` take the short way, which makes no event per packet.
-        let is_watched = hitting.is_some() || recording.is_on();
-        Self {
+        let mut wire = Self {
             now: Instant::ZERO,
             network,
             hitting,
             changes: changes.into(),
             cut: BTreeSet::new(),
             held: Held::new(settings.byte_limit),
-            is_watched,
+            is_watched: false,
             recording,
             drawn: Drawn::default(),
             said: Arc::clone(&settings.said),
-        }
+        };
+        wire.watch();
+        wire
     }
 }
 
 impl<A: Clone> Wire<A> {
     pub(crate) const fn now(&self) -> Instant {
         self.now
+    }
+
+    /// Notes whether packets must be looked at one by one.
+    fn watch(&mut self) {
+        self.is_watched = self.hitting.is_some() || self.recording.is_on() || !self.cut.is_empty();
     }
 
     /// Sets the time, which never goes back. Returns whether the time has moved.
@@ -145,10 +150,10 @@ impl<A: Clone> Wire<A> {
     /// Hands a packet to its path. Returns whether [`Wire::poll`] may have a packet now. Fails if the path is cut.
     #[inline(always)]
     pub(crate) fn offer(&mut self, path: Path, mut parcel: Box<Parcel<A>>) -> Result<bool, Lost> {
-        if self.is_watched || !self.cut.is_empty() {
+        if self.is_watched {
             self.note_offer(path, &mut parcel)?;
         }
-        self.held.add(Where::Links, Held::cost(parcel.bytes.len()));
+        self.held.add(Held::cost(parcel.bytes.len()));
         let info = PacketInfo { size: cohaptic_units::Bytes::new(parcel.bytes.len() as u64), ecn: parcel.ecn };
         let offered = self.network.handle_packet_timed(self.now, path, info, parcel);
         debug_assert!(offered.is_ok(), "hosts are checked, and time does not go back");
@@ -179,17 +184,14 @@ impl<A: Clone> Wire<A> {
         Ok(())
     }
 
-    /// Returns the next arrived packet. The caller reports the end of the packet with [`Wire::ends`].
+    /// Returns the next arrived packet. The caller reports the end of the packet with [`Wire::ends`], and removes a packet that is not kept from `held`.
     #[inline(always)]
     pub(crate) fn poll(&mut self) -> Option<Box<Parcel<A>>> {
         if !self.is_watched {
-            // Nothing is watched, so a packet that can only arrive needs no full event. A full event costs more to make.
-            let Self { network, cut, held, .. } = self;
-            let arrived = network.take_mere_arrival(|event| {
+            // Nothing is watched, so a packet that can only arrive needs no full event, which costs more to make.
+            let arrived = self.network.take_mere_arrival(|event| {
                 let (path, sequence, at, mut parcel) = (event.path, event.sequence, event.at, event.payload);
-                held.remove(Where::Links, Held::cost(parcel.bytes.len()));
-                let is_cut = !cut.is_empty() && cut.contains(&path);
-                parcel.arrival = Arrival { packet: PacketName { path, sequence, copy: 0 }, at, marked: false, is_cut };
+                parcel.arrival = Arrival { packet: PacketName { path, sequence, copy: 0 }, at, marked: false, is_cut: false };
                 parcel
             });
             // The next event may be a loss or a copy. `take_mere_arrival` stops there, and only `poll_event` handles such events.
@@ -208,12 +210,6 @@ impl<A: Clone> Wire<A> {
             let packet = PacketName { path: event.path, sequence: event.sequence, copy: event.copy };
             self.recording.keep(&event);
             let cost = Held::cost(event.payload.bytes.len());
-            // An event that is no end is a copy: the run then holds a further packet.
-            if event.fate.is_end() {
-                self.held.remove(Where::Links, cost)
-            } else {
-                self.held.add(Where::Links, cost)
-            }
             match event.fate {
                 Fate::Delivered(at) => {
                     if let Some(hitting) = &mut self.hitting {
@@ -231,13 +227,18 @@ impl<A: Clone> Wire<A> {
                     return Some(parcel);
                 }
                 Fate::Dropped(cause) => {
+                    self.held.remove(cost);
                     // Only losses by chance are noted: a printed test names them in place of the seed.
                     if cause == DropCause::Loss && self.drawn.lost.len() < MOST_LOST {
                         self.drawn.lost.push(packet);
                     }
                     self.recording.note(event.at, Happening::Lost { packet, why: Lost::on(event.part, cause) });
                 }
-                Fate::Duplicated => self.recording.note(event.at, Happening::Copied { packet }),
+                Fate::Duplicated => {
+                    // The run holds the copy as a further packet.
+                    self.held.add(cost);
+                    self.recording.note(event.at, Happening::Copied { packet });
+                }
             }
         }
     }
@@ -270,6 +271,7 @@ impl<A: Clone> Wire<A> {
     pub(crate) fn set_cut(&mut self, path: Path, cut: bool) {
         // A partition may name one host in both groups. The host still reaches itself.
         let has_changed = if cut { path.from != path.to && self.cut.insert(path) } else { self.cut.remove(&path) };
+        self.watch();
         if has_changed {
             self.note(if cut { Happening::Cut(path) } else { Happening::Mended(path) });
         }
@@ -277,6 +279,7 @@ impl<A: Clone> Wire<A> {
 
     pub(crate) fn mend_all(&mut self) {
         std::mem::take(&mut self.cut).into_iter().for_each(|path| self.note(Happening::Mended(path)));
+        self.watch();
     }
 
     /// Returns the statistics of a link, or `None` if both ends are the same host.

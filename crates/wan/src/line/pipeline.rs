@@ -23,7 +23,7 @@ use crate::packet::Outputs;
 use crate::random::{Purpose, Stream};
 use crate::stages::config::LinkConfig;
 use crate::stages::modulation::ModulationStage;
-use crate::stages::order::{Order, OrderStage};
+use crate::stages::order::OrderStage;
 use crate::stages::queue::BottleneckStage;
 
 /// The error of a call with an instant before an earlier call's instant. The callee is unchanged.
@@ -65,8 +65,8 @@ pub(crate) enum Outcome {
 /// The compiled form of a link.
 #[derive(Clone, Debug)]
 pub(crate) enum Pipeline<T> {
-    /// A constant delay \[ns\] only. The order stage keeps the latest arrival for a later change to the order `in-order`.
-    Constant(u64, OrderStage),
+    /// A constant delay \[ns\] only, and the latest arrival so far, for a later change to the order `in-order`.
+    Constant(u64, Instant),
     Direct(Box<Direct>),
     Engine(Box<Engine<T>>),
 }
@@ -76,7 +76,7 @@ impl<T: Clone> Pipeline<T> {
     pub(crate) fn new(seed: u64, name: &LinkName, model: LinkModel, general: bool) -> Self {
         match model {
             LinkModel::Fixed(config) if config.is_constant_delay() && !general => {
-                Self::Constant(constant_nanos(&config), OrderStage::new(Order::AllowReordering))
+                Self::Constant(constant_nanos(&config), Instant::ZERO)
             }
             LinkModel::Fixed(config) if config.is_direct() && !general => Self::Direct(Box::new(Direct::new(seed, name, &config))),
             LinkModel::Fixed(_) | LinkModel::Modulated(_) | LinkModel::Replay(_) | LinkModel::Kernel(_) => {
@@ -103,8 +103,11 @@ impl<T: Clone> Pipeline<T> {
     #[inline(always)]
     pub(crate) fn offer(&mut self, now: Instant, number: u64, words: Option<Words>) -> Outcome {
         match self {
-            // The order stage notes the arrival even in the usual case, for a later change of the order.
-            Self::Constant(delay, order) => Outcome::Arrives(order.arrival(now.saturating_add_nanos(*delay))),
+            Self::Constant(delay, latest) => {
+                let at = now.saturating_add_nanos(*delay);
+                *latest = at.max(*latest);
+                Outcome::Arrives(at)
+            }
             Self::Direct(direct) => {
                 let words = words.unwrap_or_else(|| direct.words(number));
                 match direct.offer(now, number, words) {
@@ -144,11 +147,11 @@ impl<T: Clone> Pipeline<T> {
                 // has no such state.
                 let past = match pipeline {
                     Self::Direct(direct) => Some((**direct).clone()),
-                    Self::Constant(delay, order) => {
+                    Self::Constant(delay, latest) => {
                         let delay = crate::stages::delay::Delay::constant(core::time::Duration::from_nanos(*delay));
                         let mut direct = Direct::new(seed, name, &LinkConfig { delay, ..LinkConfig::default() });
                         // The latest arrival goes on, so packets on the way are not overtaken under `in-order`.
-                        direct.order = *order;
+                        direct.order = OrderStage::resumed(*latest);
                         Some(direct)
                     }
                     Self::Engine(_) => None,

@@ -263,10 +263,9 @@ impl<P: Clone> Network<P> {
         info: impl Into<PacketInfo>,
         payload: P,
     ) -> Result<Option<Instant>, NetworkError> {
-        let Path { from, to } = path;
-        let path = self.path(from, to)?;
+        let link = self.existing_link(path)?;
         check_time(&mut self.now, now)?;
-        let (link, place) = self.link_and_place(path);
+        let place = self.place(path, link);
         let size = SizeAndMarks::new(info.into());
         if self.has_inner_events || self.has_filters {
             self.send_through(now, path, (link, place), size, payload);
@@ -531,28 +530,38 @@ impl<P: Clone> Network<P> {
 
     #[inline]
     fn path(&self, from: NodeId, to: NodeId) -> Result<Path, NetworkError> {
-        let exists = from.0 < self.nodes && to.0 < self.nodes && from != to && self.places.has(Path { from, to });
-        if exists { Ok(Path { from, to }) } else { Err(NetworkError::NoLink { from, to }) }
+        self.existing_link(Path { from, to }).map(|_| Path { from, to })
+    }
+
+    /// Returns the number of the link of a path, if the link exists.
+    #[inline]
+    fn existing_link(&self, path: Path) -> Result<LinkId, NetworkError> {
+        let Path { from, to } = path;
+        let exists = from.0 < self.nodes && to.0 < self.nodes && from != to;
+        if exists && let Some(link) = self.places.link(path) { Ok(link) } else { Err(NetworkError::NoLink { from, to }) }
     }
 
     /// Returns the number of the link of a path. `path` must have checked the path.
     #[inline]
     fn link(&self, path: Path) -> LinkId {
-        match &self.places {
-            Paths::All { nodes } => LinkId(u32::from(path.from.0) * u32::from(*nodes) + u32::from(path.to.0)),
-            Paths::Some(some) => some.link(path),
-        }
+        self.places.link(path).expect("packets travel on links that there are")
     }
 
     /// Returns the number of the link of a path and the link's place in `lines.links`. Makes the link first if links are made on demand.
     #[inline(always)]
     fn link_and_place(&mut self, path: Path) -> (LinkId, usize) {
         let link = self.link(path);
+        (link, self.place(path, link))
+    }
+
+    /// Returns the place in `lines.links` of the link with the number `link`, which is the link of `path`. Makes the link first if links are made on demand.
+    #[inline(always)]
+    fn place(&mut self, path: Path, link: LinkId) -> usize {
         let place = match &self.lines.on_demand {
             None => Some(link.index()),
             Some(on_demand) => on_demand.place(link),
         };
-        (link, place.unwrap_or_else(|| self.make(path, link)))
+        place.unwrap_or_else(|| self.make(path, link))
     }
 
     /// Makes a link on demand, and returns its place in `lines.links`. The instant of making changes no answer: an unused link is in its initial state, its

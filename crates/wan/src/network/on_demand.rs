@@ -61,24 +61,27 @@ impl Places {
         Self { slots: alloc::vec![FREE; 16], len: 0 }
     }
 
-    /// Returns the index of the slot with `number`, or of the free slot for `number`.
+    /// Returns the index of the slot at which the search for `number` begins.
     #[inline(always)]
     fn slot(&self, number: u32) -> usize {
-        let mask = self.slots.len() - 1;
         // Fibonacci hashing: link numbers at a fixed distance, for example of a ring of hosts, are spread evenly by the upper bits of the product.
-        let mut slot = (u64::from(number).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32) as usize & mask;
-        // At least half of the slots are free, so the search ends.
-        while self.slots[slot].0 != number && self.slots[slot].0 != FREE.0 {
-            slot = (slot + 1) & mask;
-        }
-        slot
+        (u64::from(number).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32) as usize & (self.slots.len() - 1)
     }
 
     #[inline(always)]
     fn find(&self, number: u32) -> Option<usize> {
-        let (found, place) = self.slots[self.slot(number)];
-        // The search ends at a free slot if the number is missing.
-        (found == number).then_some(place as usize)
+        let mut slot = self.slot(number);
+        // At least half of the slots are free, so the search ends.
+        loop {
+            let (found, place) = self.slots[slot];
+            if found == number {
+                return Some(place as usize);
+            }
+            if found == FREE.0 {
+                return None;
+            }
+            slot = (slot + 1) & (self.slots.len() - 1);
+        }
     }
 
     fn insert(&mut self, number: u32, place: u32) {
@@ -97,7 +100,10 @@ impl Places {
     }
 
     fn put(&mut self, number: u32, place: u32) {
-        let slot = self.slot(number);
+        let mut slot = self.slot(number);
+        while self.slots[slot].0 != FREE.0 {
+            slot = (slot + 1) & (self.slots.len() - 1);
+        }
         self.slots[slot] = (number, place);
     }
 }

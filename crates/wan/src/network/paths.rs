@@ -73,12 +73,12 @@ impl Paths {
         }
     }
 
-    /// Returns whether the path has a link. Both nodes of the path must exist.
+    /// Returns the number of the link of a path, or `None` if the path has no link. Both nodes of the path must exist.
     #[inline]
-    pub(super) fn has(&self, path: Path) -> bool {
+    pub(super) fn link(&self, path: Path) -> Option<LinkId> {
         match self {
-            Self::All { .. } => true,
-            Self::Some(some) => some.of(path.from).binary_search(&path.to).is_ok(),
+            Self::All { nodes } => Some(LinkId(u32::from(path.from.0) * u32::from(*nodes) + u32::from(path.to.0))),
+            Self::Some(some) => some.link(path),
         }
     }
 }
@@ -93,9 +93,8 @@ impl SomePaths {
         &self.receivers[self.first[from.index()] as usize..self.first[from.index() + 1] as usize]
     }
 
-    /// Returns the number of the link of a path. Panics if the path has no link.
-    pub(super) fn link(&self, path: Path) -> LinkId {
-        let place = self.of(path.from).binary_search(&path.to).expect("packets travel on links that there are");
-        LinkId::new(self.first[path.from.index()] as usize + place)
+    fn link(&self, path: Path) -> Option<LinkId> {
+        let place = self.of(path.from).binary_search(&path.to).ok()?;
+        Some(LinkId::new(self.first[path.from.index()] as usize + place))
     }
 }

@@ -27,6 +27,11 @@ impl OrderStage {
         Self { policy, latest: Instant::ZERO }
     }
 
+    /// Makes a stage that allows reordering, after packets of which the latest arrives at `latest`.
+    pub(crate) const fn resumed(latest: Instant) -> Self {
+        Self { policy: Order::AllowReordering, latest }
+    }
+
     pub(crate) const fn set_policy(&mut self, policy: Order) {
         self.policy = policy;
     }

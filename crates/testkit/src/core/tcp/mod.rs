@@ -23,7 +23,6 @@ use cohaptic_wan::NodeId;
 use super::entropy::ByHost;
 use super::waking::Waiters;
 use super::{Core, SocketName};
-use crate::wire::Where;
 use slots::Slots;
 
 pub(crate) use listeners::Inherited;
@@ -242,7 +241,7 @@ impl Core {
         self.tcp.unroute(id);
         self.tcp.remove_timer(id);
         let Some(end) = self.tcp.connections.remove(id.0) else { return };
-        self.wire.held.remove(Where::Streams, end.counted);
+        self.wire.held.recount_stream(end.counted, 0);
         end.hold.into_iter().for_each(|hold| self.tcp.ports.release(hold));
     }
 
@@ -250,9 +249,7 @@ impl Core {
     fn recount(&mut self, id: ConnId) {
         let end = self.tcp.connections.get_mut(id.0);
         let held = end.machine.held() as u64;
-        self.wire.held.add(Where::Streams, held);
-        // `counted` holds the share of this end in the sum, so the call replaces exactly this share.
-        self.wire.held.remove(Where::Streams, std::mem::replace(&mut end.counted, held));
+        self.wire.held.recount_stream(std::mem::replace(&mut end.counted, held), held);
     }
 
     /// Sets the constants of the connections that `host` opens or accepts from now on.
