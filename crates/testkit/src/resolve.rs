@@ -30,6 +30,11 @@ pub trait ToSocketAddrs {
     fn to_socket_addr(&self) -> io::Result<SocketAddr> {
         self.to_socket_addrs()?.first().copied().ok_or_else(none)
     }
+
+    /// Returns the socket address if `self` is one, and `None` for every other description. Sending a datagram then needs no copy of the address.
+    fn as_socket_addr(&self) -> Option<&SocketAddr> {
+        None
+    }
 }
 
 /// Returns the error of a description without addresses, as tokio returns it.
@@ -51,7 +56,7 @@ pub(crate) fn each<T>(addresses: impl ToSocketAddrs, mut attempt: impl FnMut(Soc
 
 /// Implements the trait for types of a single address.
 macro_rules! one_address {
-    ($($kind:ty),*) => {
+    ($($kind:ty $(: $own:expr)?),*) => {
         $(
             impl ToSocketAddrs for $kind {
                 fn to_socket_addrs(&self) -> io::Result<Vec<SocketAddr>> {
@@ -62,12 +67,19 @@ macro_rules! one_address {
                 fn to_socket_addr(&self) -> io::Result<SocketAddr> {
                     Ok((*self).into())
                 }
+
+                $(
+                    #[inline]
+                    fn as_socket_addr(&self) -> Option<&SocketAddr> {
+                        $own(self)
+                    }
+                )?
             }
         )*
     };
 }
 
-one_address!(SocketAddr, SocketAddrV4, SocketAddrV6, (IpAddr, u16), (Ipv4Addr, u16), (Ipv6Addr, u16));
+one_address!(SocketAddr: Some, SocketAddrV4, SocketAddrV6, (IpAddr, u16), (Ipv4Addr, u16), (Ipv6Addr, u16));
 
 impl ToSocketAddrs for [SocketAddr] {
     fn to_socket_addrs(&self) -> io::Result<Vec<SocketAddr>> {
@@ -164,6 +176,11 @@ impl<T: ToSocketAddrs + ?Sized> ToSocketAddrs for &T {
 
     fn to_socket_addr(&self) -> io::Result<SocketAddr> {
         (**self).to_socket_addr()
+    }
+
+    #[inline]
+    fn as_socket_addr(&self) -> Option<&SocketAddr> {
+        (**self).as_socket_addr()
     }
 }
 

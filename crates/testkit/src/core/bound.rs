@@ -4,12 +4,27 @@
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct SocketId(pub(super) usize);
 
-/// Bound sockets of a host, sorted by version of IP, then by port. Sockets of the same port keep the order of binding.
+/// Bound sockets of a host, sorted by version of IP, then by port.
 ///
 /// A sorted array, because each arriving datagram looks up its port and most hosts have few sockets. Dynamic ports ascend, so most sockets are added at the
 /// end.
 #[derive(Debug, Default)]
-pub(super) struct Bound(Vec<(Port, SocketId)>);
+pub(super) struct Bound(Vec<AtPort>);
+
+/// Sockets of one port, in the order of binding.
+#[derive(Debug)]
+pub(super) struct AtPort {
+    port: Port,
+    pub(super) first: SocketId,
+    /// Sockets that were bound after `first`. Most ports have one socket.
+    pub(super) others: Vec<SocketId>,
+}
+
+impl AtPort {
+    pub(super) fn all(&self) -> impl Iterator<Item = SocketId> {
+        std::iter::once(self.first).chain(self.others.iter().copied())
+    }
+}
 
 /// Port of one version of IP. The lower 16 bits are the number of the port; the next bit is set for version 6.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -33,25 +48,30 @@ impl Port {
 }
 
 impl Bound {
-    /// Returns the sockets of `port`, in the order of binding.
+    /// Returns the sockets of `port`, or `None` if no socket is bound there.
     #[inline]
-    pub(super) fn at(&self, port: Port) -> &[(Port, SocketId)] {
-        let from = &self.0[self.0.partition_point(|(bound, _)| *bound < port)..];
-        &from[..from.iter().take_while(|(bound, _)| *bound == port).count()]
+    pub(super) fn at(&self, port: Port) -> Option<&AtPort> {
+        self.0.get(self.0.partition_point(|at| at.port < port)).filter(|at| at.port == port)
     }
 
     /// Adds a socket after all sockets of the same port.
     pub(super) fn add(&mut self, port: Port, socket: SocketId) {
-        let place = self.0.partition_point(|(bound, _)| *bound <= port);
-        self.0.insert(place, (port, socket));
+        match self.0.binary_search_by_key(&port, |at| at.port) {
+            Ok(place) => self.0[place].others.push(socket),
+            Err(place) => self.0.insert(place, AtPort { port, first: socket, others: Vec::new() }),
+        }
     }
 
     /// Removes a socket. Does nothing if the socket is not there, because its host crashed in between and forgot all its sockets.
     pub(super) fn remove(&mut self, port: Port, socket: SocketId) {
-        let first = self.0.partition_point(|(bound, _)| *bound < port);
-        let place = self.at(port).iter().position(|(_, bound)| *bound == socket);
-        if let Some(place) = place {
-            self.0.remove(first + place);
+        let Ok(place) = self.0.binary_search_by_key(&port, |at| at.port) else { return };
+        let AtPort { first, others, .. } = &mut self.0[place];
+        if *first != socket {
+            others.retain(|other| *other != socket);
+        } else if others.is_empty() {
+            self.0.remove(place);
+        } else {
+            *first = others.remove(0);
         }
     }
 }
@@ -68,12 +88,16 @@ mod tests {
         for (port, socket) in given {
             bound.add(port, SocketId(socket));
         }
-        let at = |bound: &Bound, port| bound.at(port).iter().map(|(_, socket)| socket.0).collect::<Vec<_>>();
+        let at = |bound: &Bound, port| bound.at(port).into_iter().flat_map(AtPort::all).map(|socket| socket.0).collect::<Vec<_>>();
         assert_eq!(at(&bound, port(false, 7)), [2, 3, 5]);
         bound.remove(port(false, 7), SocketId(3));
         // The second call finds the socket gone and does nothing.
         bound.remove(port(false, 7), SocketId(3));
         assert_eq!(at(&bound, port(false, 7)), [2, 5]);
+        bound.remove(port(false, 7), SocketId(2));
+        assert_eq!(at(&bound, port(false, 7)), [5]);
+        bound.remove(port(false, 7), SocketId(5));
+        assert!(at(&bound, port(false, 7)).is_empty());
         assert_eq!(at(&bound, port(true, 7)), [1]);
         assert_eq!([at(&bound, port(false, 8)), at(&bound, port(false, 9))], [[4], [0]]);
         assert!(at(&bound, port(true, 8)).is_empty());

@@ -1,7 +1,7 @@
 //! Way of a datagram from the sending socket into its link, and from the link to the receiving socket.
 
 use std::io;
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 
 use cohaptic_units::Ecn;
 use cohaptic_wan::{NodeId, Path};
@@ -11,10 +11,15 @@ use super::{Core, Ends, Kind, Parcel, SocketId};
 use crate::address::Addresses;
 use crate::errno::Errno;
 use crate::trace::Lost;
-use crate::wire::Held;
+use crate::wire::{Arrival, Held};
 
 /// Longest datagram over IPv4 and over IPv6 \[bytes\].
 const LONGEST: [usize; 2] = [65_507, 65_527];
+
+#[cold]
+const fn is_too_long(len: usize, is_six: bool) -> bool {
+    len > LONGEST[is_six as usize]
+}
 
 /// Datagram that a socket sends.
 #[derive(Clone, Copy, Debug)]
@@ -50,16 +55,14 @@ pub(super) struct Route {
 impl Core {
     /// Sends a datagram at the present instant.
     #[inline(always)]
-    pub(crate) fn send(&mut self, id: SocketId, outgoing: Outgoing<'_>) -> io::Result<()> {
+    pub(crate) fn send(&mut self, id: SocketId, Outgoing { to, bytes, ecn }: Outgoing<'_>) -> io::Result<()> {
         self.note_call(|core| core.sockets.get(id).name());
-        let Outgoing { to, bytes, ecn } = outgoing;
         let socket = self.sockets.get(id);
         if socket.has_error() {
             return Err(self.error_of(id));
         }
-        let host = socket.host;
         let Some(to) = to.or(socket.peer.as_ref()) else { return Errno::NoDestination.fail() };
-        // The address is read in its place: a copy takes more instructions than all that is done with the address.
+        // The address is read in its place: copies of it take more instructions than the search of the receiver.
         let other_form;
         let to = if socket.is_wire_form(to) {
             to
@@ -67,21 +70,27 @@ impl Core {
             other_form = socket.wire_form(*to)?;
             &other_form
         };
-        let (to_port, is_six) = (to.port(), to.is_ipv6());
+        let (number, to_port, is_six) = match to {
+            SocketAddr::V4(to) => (Addresses::short(IpAddr::V4(*to.ip())), to.port(), false),
+            SocketAddr::V6(to) => (Addresses::short(IpAddr::V6(*to.ip())), to.port(), true),
+        };
         if to_port == 0 {
             return Errno::InvalidInput.fail();
         }
-        if bytes.len() > LONGEST[usize::from(is_six)] {
+        if bytes.len() > LONGEST[0] && is_too_long(bytes.len(), is_six) {
             return Errno::TooLong.fail();
         }
-        let Route { from, to: number, receivers } = self.route(socket, to)?;
-        let addresses = Ends::of([from, number], [socket.port.number(), to_port], is_six, Kind::Datagram);
-        match receivers {
-            Receivers::One(receiver) if receiver != host => {
-                let parcel = self.spare.copied(addresses, bytes, ecn);
+        let (host, from_port) = (socket.host, socket.port.number());
+        match self.plan.owner_of(number, is_six) {
+            Some(receiver) if receiver != host => {
+                let from = self.source_to_host(socket, number, to)?;
+                let parcel = self.spare.copied(Ends::of([from, number], [from_port, to_port], is_six, Kind::Datagram), bytes, ecn);
                 self.offer(Path { from: host, to: receiver }, parcel);
             }
-            receivers => self.send_within(host, receivers, addresses, outgoing),
+            _ => {
+                let route = self.route(socket, to)?;
+                self.send_within(host, route, [from_port, to_port], is_six, bytes, ecn);
+            }
         }
         // The check comes after the sending: a packet that arrives at once and is read or lost is not held any more.
         if self.wire.held.is_too_much() {
@@ -90,10 +99,11 @@ impl Core {
         Ok(())
     }
 
-    /// Sends a datagram to its own host, to all hosts, or to nobody.
+    /// Sends a datagram that does not go to another host alone: to its own host, to all hosts, or to nobody.
     #[inline(never)]
-    fn send_within(&mut self, host: NodeId, receivers: Receivers, addresses: Ends, Outgoing { bytes, ecn, .. }: Outgoing<'_>) {
-        let parcel = self.spare.copied(addresses, bytes, ecn);
+    fn send_within(&mut self, host: NodeId, route: Route, ports: [u16; 2], is_six: bool, bytes: &[u8], ecn: Ecn) {
+        let Route { from, to, receivers } = route;
+        let parcel = self.spare.copied(Ends::of([from, to], ports, is_six, Kind::Datagram), bytes, ecn);
         match receivers {
             Receivers::One(_) => self.hand_over(host, parcel),
             Receivers::All => {
@@ -115,29 +125,29 @@ impl Core {
     /// # Errors
     ///
     /// If the network cannot be reached from the address of the socket, or the socket may not broadcast.
-    #[inline(always)]
+    #[inline(never)]
     pub(super) fn route(&self, socket: &SocketState, to: &SocketAddr) -> io::Result<Route> {
         // An address of a host belongs to no other kind of address. Most datagrams go to such an address, so the other kinds are tried only afterwards.
-        let (number, is_six) = (Addresses::short(to.ip()), to.is_ipv6());
-        let Some(owner) = self.plan.owner_of(number, is_six) else { return self.other_route(socket, to, number) };
-        let from = match socket.at {
-            // No host has an address of loopback, whose source would be another one.
-            None => self.plan.short(socket.host, is_six),
-            Some(at) => self.check_source(socket.host, at, number, to).map(|()| at)?,
-        };
-        Ok(Route { from, to: number, receivers: Receivers::One(owner) })
-    }
-
-    /// Like [`Core::route`], for the address `number` that no host has.
-    #[inline(never)]
-    fn other_route(&self, socket: &SocketState, to: &SocketAddr, number: u32) -> io::Result<Route> {
-        let mut number = number;
+        let mut number = Addresses::short(to.ip());
+        if let Some(owner) = self.plan.owner_of(number, to.is_ipv6()) {
+            return Ok(Route { from: self.source_to_host(socket, number, to)?, to: number, receivers: Receivers::One(owner) });
+        }
         let receivers = self.other_receivers(socket.host, to, &mut number)?;
         let from = self.source(socket.host, socket.at, number, to)?;
         if matches!(receivers, Receivers::All) && !socket.may_broadcast {
             return Errno::PermissionDenied.fail();
         }
         Ok(Route { from, to: number, receivers })
+    }
+
+    /// Returns the source address of a socket that sends to the address `number` of a host, given by the program as `to`. Unlike with [`Core::source`], the
+    /// address is no address of loopback.
+    #[inline(always)]
+    fn source_to_host(&self, socket: &SocketState, number: u32, to: &SocketAddr) -> io::Result<u32> {
+        match socket.at {
+            None => Ok(self.plan.short(socket.host, to.is_ipv6())),
+            Some(at) => self.check_source(socket.host, at, number, to).map(|()| at),
+        }
     }
 
     /// Returns the receivers of a datagram from `host` to an address that no host has. Sets `number` to the address on the packet, which differs for the
@@ -214,18 +224,11 @@ impl Core {
     pub(super) fn take_arrivals(&mut self) {
         loop {
             while let Some(parcel) = self.wire.poll() {
-                // The name is copied only where it is recorded: parts that were stored a moment ago are slow to load as a whole.
-                let recorded = self.wire.recording().traces.then(|| (parcel.arrival.packet, parcel.arrival.at));
-                let Path { from, to } = parcel.arrival.packet.path;
-                let path = Path { from, to: self.receiver(Path { from, to }) };
-                let end = if parcel.arrival.is_cut {
-                    self.wire.held.remove(Held::cost(parcel.bytes.len()));
-                    Err(Lost::Cut)
+                if self.wire.is_watched() {
+                    self.take_watched(parcel);
                 } else {
-                    self.arrive(path, parcel)
-                };
-                if let Some((packet, at)) = recorded {
-                    self.wire.ends(packet, at, end);
+                    let path = parcel.arrival.packet.path;
+                    let _ = self.arrive(Path { to: self.receiver(path), ..path }, parcel);
                 }
             }
             #[cfg(feature = "tcp")]
@@ -235,6 +238,19 @@ impl Core {
             }
             return;
         }
+    }
+
+    /// Delivers a packet that has come out of a link, and records its end.
+    #[inline(never)]
+    fn take_watched(&mut self, parcel: Box<Parcel>) {
+        let Arrival { packet, at, is_cut, .. } = parcel.arrival;
+        let end = if is_cut {
+            self.wire.held.remove(Held::cost(parcel.bytes.len()));
+            Err(Lost::Cut)
+        } else {
+            self.arrive(Path { to: self.receiver(packet.path), ..packet.path }, parcel)
+        };
+        self.wire.ends(packet, at, end);
     }
 
     /// Returns the host at which the packets of a link arrive.
@@ -265,8 +281,13 @@ impl Core {
         if parcel.addresses.kind != Kind::Datagram {
             return self.arrive_other(path, parcel);
         }
-        let Some(id) = self.socket_for(path.to, &parcel.addresses) else { return Err(self.lose(path, &parcel)) };
-        self.sockets.get_mut(id).keep(parcel, &mut self.wire.held, &mut self.woken)
+        if let Some(id) = self.socket_for(path.to, &parcel.addresses) {
+            let socket = self.sockets.get_mut(id);
+            if socket.hears(&parcel.addresses) {
+                return socket.keep(parcel, &mut self.wire.held, &mut self.woken);
+            }
+        }
+        Err(self.lose(path, &parcel))
     }
 
     /// Like [`Core::arrive`], for a packet that is no datagram.
@@ -279,30 +300,33 @@ impl Core {
             self.spare.put(parcel);
             return end;
         }
-        let Some(id) = self.socket_for(path.to, &parcel.addresses) else { return Err(self.lose(path, &parcel)) };
-        self.wire.held.remove(Held::cost(parcel.bytes.len()));
         // As with Linux, only a connected socket gets the error. An unconnected socket could not tell which of its peers refused.
-        self.sockets.get_mut(id).refuse(parcel.addresses.from(), &mut self.woken);
-        Ok(())
+        if let Some(id) = self.socket_for(path.to, &parcel.addresses) {
+            let socket = self.sockets.get_mut(id);
+            if socket.hears(&parcel.addresses) {
+                self.wire.held.remove(Held::cost(parcel.bytes.len()));
+                socket.refuse(parcel.addresses.from(), &mut self.woken);
+                return Ok(());
+            }
+        }
+        Err(self.lose(path, &parcel))
     }
 
-    /// Returns the socket of `host` that receives the packet. A socket connected to the sender comes before an unconnected socket, then a socket bound to the
-    /// address before a socket bound to all addresses, then the socket that was bound last.
+    /// Returns the socket of `host` that receives the packet, if the socket [hears](SocketState::hears) the packet, which the caller checks. A socket connected
+    /// to the sender comes before an unconnected socket, then a socket bound to the address before a socket bound to all addresses, then the socket that was
+    /// bound last.
     #[inline(always)]
     fn socket_for(&self, host: NodeId, ends: &Ends) -> Option<SocketId> {
         if !self.has_address(host, ends) {
             return None;
         }
-        match self.hosts[host.index()].bound.at(ends.port()) {
-            [] => None,
-            // Most ports have one socket, which needs no comparison with others.
-            [(_, id)] => self.sockets.get(*id).hears(ends).then_some(*id),
-            several => {
-                let rank = |(_, id): &&(_, SocketId)| (self.sockets.get(*id).peer.is_some(), self.sockets.get(*id).at.is_some());
-                // `several` has the order of binding, and of equal ranks `max_by_key` returns the last.
-                several.iter().filter(|(_, id)| self.sockets.get(*id).hears(ends)).max_by_key(rank).map(|(_, id)| *id)
-            }
+        let bound = self.hosts[host.index()].bound.at(ends.port())?;
+        if bound.others.is_empty() {
+            return Some(bound.first);
         }
+        let rank = |id: &SocketId| (self.sockets.get(*id).peer.is_some(), self.sockets.get(*id).at.is_some());
+        // The sockets have the order of binding, and of equal ranks `max_by_key` returns the last.
+        bound.all().filter(|id| self.sockets.get(*id).hears(ends)).max_by_key(rank)
     }
 
     /// Returns whether `host` has the address to which the packet goes.

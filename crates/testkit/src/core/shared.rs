@@ -125,6 +125,12 @@ impl Shared {
         if self.is_synced() { self.face.now() } else { self.asked_now() }
     }
 
+    /// Counts a call of a program, and returns the time of the run. Returns `None` if the clock must be asked, or there are too many calls.
+    #[inline]
+    pub(crate) fn counted_now(&self) -> Option<Instant> {
+        (self.is_synced() && self.face.count_call()).then(|| self.face.now())
+    }
+
     /// Returns the time of the run after asking the clock.
     #[inline(never)]
     fn asked_now(&self) -> Instant {
@@ -203,9 +209,12 @@ impl Shared {
     /// Asks the state, which is at hand or here for a visit.
     #[inline(always)]
     pub(super) fn ask<T>(&self, visit: Option<Visit<'_>>, ask: impl FnOnce(&mut Core) -> T) -> T {
-        let (outcome, woken) = HERE.with_borrow_mut(|here| {
+        let mut woken = None;
+        let outcome = HERE.with_borrow_mut(|here| {
             let core = here.as_mut().expect("the state was brought here");
-            (ask(core), core.woken.take())
+            let outcome = ask(core);
+            woken = core.woken.take();
+            outcome
         });
         // The state goes home before the wakers run: a waker may ask the state.
         if let Some(visit) = visit {

@@ -66,8 +66,12 @@ impl SocketState {
     #[inline(always)]
     pub(super) fn keep(&mut self, mut parcel: Box<Parcel>, all: &mut Held, woken: &mut Woken) -> Result<(), Lost> {
         let (len, is_six) = (parcel.bytes.len(), parcel.addresses.is_six);
-        parcel.addresses.is_mapped = self.port.is_six() && !is_six;
-        let memory = self.memory + memory_of(len, is_six);
+        // The program of a socket of IPv4 sees the addresses as they are.
+        if self.port.is_six() {
+            parcel.addresses.is_mapped = !is_six;
+        }
+        parcel.memory = memory_of(len, is_six);
+        let memory = self.memory + parcel.memory;
         // An empty buffer takes a datagram of any length: otherwise a program with a small buffer would never receive a long datagram.
         if memory > self.room && self.memory > 0 {
             all.remove(Held::cost(len));
@@ -177,7 +181,7 @@ impl SocketState {
 /// Returns the memory that Linux counts for a received datagram of `len` bytes (`SKB_TRUESIZE`): a descriptor of 256 bytes, and a piece of memory for headers
 /// and data whose size is a power of two, apart from the smallest.
 #[inline]
-pub(super) const fn memory_of(len: usize, is_six: bool) -> usize {
+const fn memory_of(len: usize, is_six: bool) -> usize {
     let used = len + if is_six { 72 } else { 59 };
     if used <= 256 { 832 } else { 256 + (used + 320).next_power_of_two() }
 }

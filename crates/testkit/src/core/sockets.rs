@@ -9,7 +9,7 @@ use cohaptic_units::print::Seconds;
 use cohaptic_wan::{NodeId, Ring};
 
 use super::bound::{Port, SocketId};
-use super::socket_state::{SocketState, memory_of};
+use super::socket_state::SocketState;
 use super::waking::Waiters;
 use super::{Core, Parcel};
 use crate::address::Addresses;
@@ -90,9 +90,8 @@ impl Core {
         // A socket bound to all addresses conflicts with every socket of the port. At `[::]` these are the sockets of both versions of IP.
         let is_taken = bound
             .at(Port::new(ip.is_ipv6(), port))
-            .iter()
-            .any(|(_, id)| ip.is_unspecified() || self.sockets.get(*id).at.is_none_or(|other| other == Addresses::short(ip)));
-        is_taken || ip == IpAddr::V6(Ipv6Addr::UNSPECIFIED) && !bound.at(Port::new(false, port)).is_empty()
+            .is_some_and(|at| at.all().any(|id| ip.is_unspecified() || self.sockets.get(id).at.is_none_or(|other| other == Addresses::short(ip))));
+        is_taken || ip == IpAddr::V6(Ipv6Addr::UNSPECIFIED) && bound.at(Port::new(false, port)).is_some()
     }
 
     fn free_port(&mut self, host: NodeId, ip: IpAddr) -> io::Result<u16> {
@@ -224,7 +223,7 @@ impl Core {
         };
         let len = datagram.bytes.len();
         socket.held -= len;
-        socket.memory -= memory_of(len, datagram.addresses.is_six);
+        socket.memory -= datagram.memory;
         self.wire.held.remove(Held::cost(len));
         // `look` returns no reference into the datagram, so the memory of the datagram is used again at once.
         let seen = look(&datagram);

@@ -347,7 +347,10 @@ impl Executor {
     /// Polls the first task of the batch. Returns whether the task is over, or `None` if no task can go on.
     #[inline(always)]
     fn poll_one(&self, batch: &mut Batch, now: Instant) -> Option<Poll<()>> {
-        let number = batch.take().or_else(|| self.next_batch(batch))?;
+        let number = match batch.take() {
+            Some(number) => number,
+            None => self.next_batch(batch)?,
+        };
         self.last.set(number);
         // The borrow ends before the poll: the polled task may start further tasks, which get other indices.
         let Some(slot) = self.slots.borrow().get(number).and_then(Clone::clone) else { return Some(Poll::Pending) };

@@ -72,6 +72,9 @@ impl UdpSocket {
 
     #[inline]
     fn send_to_now(&self, to: &impl ToSocketAddrs, bytes: &[u8]) -> io::Result<usize> {
+        if let Some(to) = to.as_socket_addr() {
+            return self.send_now(Some(to), bytes, Ecn::NotCapable);
+        }
         match to.to_socket_addr() {
             Ok(to) => self.send_now(Some(&to), bytes, Ecn::NotCapable),
             // A name cannot be looked up outside of the run. The error of a socket that may not be used is more useful than the error of the name.

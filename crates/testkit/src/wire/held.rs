@@ -37,6 +37,7 @@ impl Held {
     /// Removes bytes that were [added](Held::add).
     #[inline(always)]
     pub(crate) const fn remove(&mut self, bytes: u64) {
+        debug_assert!(self.total >= bytes, "removed bytes were added before");
         self.total -= bytes;
     }
 
@@ -67,8 +68,8 @@ impl Held {
         }
         panic!(
             "too many bytes are under way after a send of {sender}: the test bed holds {} bytes that were sent and neither read nor lost, and its limit is {} \
-             bytes. {} bytes are on links, {buffers} in buffers of sockets and {} in streams; each packet counts {PACKET_COST} bytes more than its content. Let the \
-             sender wait, for an answer or by `sleep(..).await`, and let receivers read. `byte_limit` of the test bed sets another limit",
+             bytes. {} bytes are on links, {buffers} in buffers of sockets and {} in streams; each packet counts {PACKET_COST} bytes more than its content. \
+             Let the sender wait, for an answer or by `sleep(..).await`, and let receivers read. `byte_limit` of the test bed sets another limit",
             self.total,
             self.limit,
             self.total - self.streams - buffers,

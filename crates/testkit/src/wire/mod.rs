@@ -51,7 +51,7 @@ pub(crate) struct Wire<A> {
     cut: BTreeSet<Path>,
     /// Bytes that the run holds, on links and at sockets and nodes.
     pub(crate) held: Held,
-    /// Whether packets are hit by laws, recorded, or stopped by cuts.
+    /// `true` if packets are hit by laws, recorded, or stopped by cuts.
     is_watched: bool,
     /// State of the laws; `None` without laws.
     hitting: Option<Box<Hitting<A>>>,
@@ -100,6 +100,12 @@ impl<A: HasFlow + Clone + Send + Sync + 'static> Wire<A> {
 impl<A: Clone> Wire<A> {
     pub(crate) const fn now(&self) -> Instant {
         self.now
+    }
+
+    /// Returns whether packets are hit by laws, recorded, or stopped by cuts. Otherwise no arriving packet is cut, and the ends of packets are not recorded.
+    #[inline]
+    pub(crate) const fn is_watched(&self) -> bool {
+        self.is_watched
     }
 
     /// Notes whether packets must be looked at one by one.
@@ -153,12 +159,13 @@ impl<A: Clone> Wire<A> {
         if self.is_watched {
             self.note_offer(path, &mut parcel)?;
         }
-        self.held.add(Held::cost(parcel.bytes.len()));
-        let info = PacketInfo { size: cohaptic_units::Bytes::new(parcel.bytes.len() as u64), ecn: parcel.ecn };
-        let offered = self.network.handle_packet_timed(self.now, path, info, parcel);
+        let (now, len) = (self.now, parcel.bytes.len());
+        self.held.add(Held::cost(len));
+        let info = PacketInfo { size: cohaptic_units::Bytes::new(len as u64), ecn: parcel.ecn };
+        let offered = self.network.handle_packet_timed(now, path, info, parcel);
         debug_assert!(offered.is_ok(), "hosts are checked, and time does not go back");
         // All events due before have been polled, so only this packet can have come out of its link.
-        Ok(self.is_watched || !matches!(offered, Ok(Some(at)) if at > self.now))
+        Ok(!matches!(offered, Ok(Some(at)) if at > now) || self.is_watched)
     }
 
     /// Records that a packet is offered to its path, and asks the laws about the packet. Fails if the path is cut.
@@ -188,10 +195,12 @@ impl<A: Clone> Wire<A> {
     #[inline(always)]
     pub(crate) fn poll(&mut self) -> Option<Box<Parcel<A>>> {
         if !self.is_watched {
-            // Nothing is watched, so a packet that can only arrive needs no full event, which costs more to make.
+            // Nothing is watched, so a packet that can only arrive needs no full event. A full event costs more to make.
             let arrived = self.network.take_mere_arrival(|event| {
-                let (path, sequence, at, mut parcel) = (event.path, event.sequence, event.at, event.payload);
-                parcel.arrival = Arrival { packet: PacketName { path, sequence, copy: 0 }, at, marked: false, is_cut: false };
+                let (path, at, mut parcel) = (event.path, event.at, event.payload);
+                let Arrival { packet, .. } = &mut parcel.arrival;
+                packet.path = path;
+                (parcel.arrival.at, parcel.arrival.marked, parcel.arrival.is_cut) = (at, false, false);
                 parcel
             });
             // The next event may be a loss or a copy. `take_mere_arrival` stops there, and only `poll_event` handles such events.

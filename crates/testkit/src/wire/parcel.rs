@@ -22,6 +22,8 @@ pub(crate) struct Parcel<A> {
     pub(crate) ecn: Ecn,
     /// `true` if a law drops the packet before its link. Set for every packet of a run with laws.
     pub(crate) is_hit: bool,
+    /// Memory that the buffer of the receiving socket counts for the packet \[byte\]. Set when the packet enters the buffer.
+    pub(crate) memory: usize,
     /// Report of the link. Valid only for a parcel that its link has delivered.
     pub(crate) arrival: Arrival,
 }
@@ -35,6 +37,7 @@ pub(crate) trait HasFlow {
 /// Report of a link about a delivered packet.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arrival {
+    /// Name of the packet. In a run that is not [watched](super::Wire::is_watched) nobody asks for the numbers of the name, and only the path is set.
     pub(crate) packet: PacketName,
     pub(crate) at: Instant,
     /// `true` if an active queue marked the packet.
@@ -46,7 +49,7 @@ pub(crate) struct Arrival {
 impl<A> Parcel<A> {
     pub(crate) const fn new(addresses: A, bytes: Octets, ecn: Ecn) -> Self {
         let packet = PacketName { path: Path { from: NodeId(0), to: NodeId(0) }, sequence: 0, copy: 0 };
-        Self { addresses, bytes, ecn, is_hit: false, arrival: Arrival { packet, at: Instant::ZERO, marked: false, is_cut: false } }
+        Self { addresses, bytes, ecn, is_hit: false, memory: 0, arrival: Arrival { packet, at: Instant::ZERO, marked: false, is_cut: false } }
     }
 }
 

@@ -75,9 +75,7 @@ impl<T: Clone> Pipeline<T> {
     /// Makes the smallest pipeline for this model, or the most general pipeline if `general` is set.
     pub(crate) fn new(seed: u64, name: &LinkName, model: LinkModel, general: bool) -> Self {
         match model {
-            LinkModel::Fixed(config) if config.is_constant_delay() && !general => {
-                Self::Constant(constant_nanos(&config), Instant::ZERO)
-            }
+            LinkModel::Fixed(config) if config.is_constant_delay() && !general => Self::Constant(constant_nanos(&config), Instant::ZERO),
             LinkModel::Fixed(config) if config.is_direct() && !general => Self::Direct(Box::new(Direct::new(seed, name, &config))),
             LinkModel::Fixed(_) | LinkModel::Modulated(_) | LinkModel::Replay(_) | LinkModel::Kernel(_) => {
                 Self::Engine(Box::new(Engine::new(kind(Instant::ZERO, seed, name, model, None))))

@@ -249,6 +249,7 @@ impl Core {
     fn recount(&mut self, id: ConnId) {
         let end = self.tcp.connections.get_mut(id.0);
         let held = end.machine.held() as u64;
+        // `counted` holds the share of this end in the sum, so the call replaces exactly this share.
         self.wire.held.recount_stream(std::mem::replace(&mut end.counted, held), held);
     }
 
