@@ -1,10 +1,11 @@
 //! State of a UDP socket: address and peer, the datagrams in the buffer, and the tasks that wait for datagrams.
 
+use std::collections::VecDeque;
 use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
 
 use cohaptic_units::Instant;
-use cohaptic_wan::{NodeId, Ring};
+use cohaptic_wan::NodeId;
 
 use super::bound::Port;
 use super::waking::{Waiters, Woken};
@@ -47,7 +48,7 @@ pub(crate) struct SocketState {
     pub(super) peer: Option<SocketAddr>,
     /// Size of the receive buffer \[byte\].
     pub(super) room: usize,
-    pub(super) inbox: Ring<Box<Parcel>>,
+    pub(super) inbox: VecDeque<Box<Parcel>>,
     /// Bytes of all datagrams in `inbox`, without overhead.
     pub(super) held: usize,
     /// Memory that Linux would count for all datagrams in `inbox` \[bytes\].
@@ -79,13 +80,13 @@ impl SocketState {
         }
         self.memory = memory;
         self.held += len;
-        self.inbox.push(|| parcel);
+        self.inbox.push_back(parcel);
         self.readers.wake(woken);
         Ok(())
     }
 
     /// Returns the bytes of the datagrams in the buffer, as [`Held`] counts them.
-    pub(super) const fn cost(&self) -> u64 {
+    pub(super) fn cost(&self) -> u64 {
         self.held as u64 + self.inbox.len() as u64 * Held::cost(0)
     }
 

@@ -1,12 +1,13 @@
 //! UDP sockets: bound ports, datagrams in buffers, and the tasks that wait for datagrams.
 
+use std::collections::VecDeque;
 use std::io;
 use std::net::{IpAddr, Ipv6Addr, SocketAddr};
 use std::task::{Poll, Waker};
 
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
-use cohaptic_wan::{NodeId, Ring};
+use cohaptic_wan::NodeId;
 
 use super::bound::{Port, SocketId};
 use super::socket_state::SocketState;
@@ -69,7 +70,7 @@ impl Core {
             port => port,
         };
         let (at, port) = ((!ip.is_unspecified()).then(|| Addresses::short(ip)), Port::new(ip.is_ipv6(), port));
-        let (readers, inbox, room) = (Waiters::default(), Ring::new(), self.settings.receive_buffer);
+        let (readers, inbox, room) = (Waiters::default(), VecDeque::new(), self.settings.receive_buffer);
         let state =
             SocketState { host, at, port, peer: None, room, inbox, held: 0, memory: 0, readers, refused: false, may_broadcast: false, died: None };
         let bound = &mut self.hosts[host.index()].bound;
@@ -215,7 +216,7 @@ impl Core {
         if PEEK && let Some(datagram) = socket.inbox.front() {
             return Poll::Ready(Ok(look(datagram)));
         }
-        let Some(datagram) = socket.inbox.pop() else {
+        let Some(datagram) = socket.inbox.pop_front() else {
             if let Some(waker) = waker {
                 socket.readers.wait(waker);
             }
