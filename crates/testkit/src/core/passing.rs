@@ -35,7 +35,7 @@ pub(crate) struct Outgoing<'a> {
 #[derive(Clone, Copy, Debug)]
 enum Receivers {
     /// A single host, which may be the sender itself.
-    One(NodeId),
+    One,
     /// All hosts, the sender included.
     All,
     /// No host: the datagram is lost without an error, as in a real network.
@@ -62,7 +62,7 @@ impl Core {
             return Err(self.error_of(id));
         }
         let Some(to) = to.or(socket.peer.as_ref()) else { return Errno::NoDestination.fail() };
-        // The address is read in its place: copies of it take more instructions than the search of the receiver.
+        // The address is read in its place: copies of an address take more instructions than the search of the receiver.
         let other_form;
         let to = if socket.is_wire_form(to) {
             to
@@ -105,7 +105,7 @@ impl Core {
         let Route { from, to, receivers } = route;
         let parcel = self.spare.copied(Ends::of([from, to], ports, is_six, Kind::Datagram), bytes, ecn);
         match receivers {
-            Receivers::One(_) => self.hand_over(host, parcel),
+            Receivers::One => self.hand_over(host, parcel),
             Receivers::All => {
                 // The receiver of the link of a loopback is the sender.
                 let paths = (0..self.hosts.len()).map(|other| Path { from: host, to: NodeId::new(other) });
@@ -129,10 +129,10 @@ impl Core {
     pub(super) fn route(&self, socket: &SocketState, to: &SocketAddr) -> io::Result<Route> {
         // An address of a host belongs to no other kind of address. Most datagrams go to such an address, so the other kinds are tried only afterwards.
         let mut number = Addresses::short(to.ip());
-        if let Some(owner) = self.plan.owner_of(number, to.is_ipv6()) {
-            return Ok(Route { from: self.source_to_host(socket, number, to)?, to: number, receivers: Receivers::One(owner) });
+        if self.plan.owner_of(number, to.is_ipv6()).is_some() {
+            return Ok(Route { from: self.source_to_host(socket, number, to)?, to: number, receivers: Receivers::One });
         }
-        let receivers = self.other_receivers(socket.host, to, &mut number)?;
+        let receivers = self.other_receivers(to, &mut number)?;
         let from = self.source(socket.host, socket.at, number, to)?;
         if matches!(receivers, Receivers::All) && !socket.may_broadcast {
             return Errno::PermissionDenied.fail();
@@ -150,9 +150,9 @@ impl Core {
         }
     }
 
-    /// Returns the receivers of a datagram from `host` to an address that no host has. Sets `number` to the address on the packet, which differs for the
+    /// Returns the receivers of a datagram to an address that no host has. Sets `number` to the address on the packet, which differs for the
     /// unspecified address.
-    fn other_receivers(&self, host: NodeId, to: &SocketAddr, number: &mut u32) -> io::Result<Receivers> {
+    fn other_receivers(&self, to: &SocketAddr, number: &mut u32) -> io::Result<Receivers> {
         let ip = to.ip();
         if ip.is_multicast() {
             return Err(io::Error::new(
@@ -162,10 +162,10 @@ impl Core {
         }
         if ip.is_unspecified() {
             *number = Addresses::LOOPBACK[usize::from(ip.is_ipv6())];
-            return Ok(Receivers::One(host));
+            return Ok(Receivers::One);
         }
         if ip.is_loopback() {
-            return Ok(Receivers::One(host));
+            return Ok(Receivers::One);
         }
         if ip.is_ipv4() && Addresses::is_broadcast(*number) {
             return Ok(Receivers::All);

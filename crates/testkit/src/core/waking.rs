@@ -146,7 +146,7 @@ pub(super) struct ToWake(Vec<Waker>);
 
 impl ToWake {
     #[cold]
-    pub(super) fn wake(self: Box<Self>) {
+    pub(super) fn wake(self) {
         self.0.into_iter().for_each(Waker::wake);
     }
 }

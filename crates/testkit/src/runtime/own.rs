@@ -47,7 +47,7 @@ impl Here {
     #[inline]
     fn push(&self, number: usize) {
         let mut ready = self.ready.borrow_mut();
-        // Growing is a call of its own, so that waking saves no registers for it.
+        // A queue that must grow is left to another function, so that waking saves no registers.
         if ready.len() == ready.capacity() {
             drop(ready);
             return self.push_growing(number);

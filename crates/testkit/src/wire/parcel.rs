@@ -171,19 +171,20 @@ impl Octets {
         match &mut self.content {
             // Packets of a flow often have one length. A copy of equal length needs no check of the capacity.
             Content::Own(octets) if octets.len() == bytes.len() => octets.copy_from_slice(bytes),
-            _ => self.refill_anew(bytes),
+            Content::Own(_) | Content::Shared(_) => self.refill_anew(bytes),
+            #[cfg(feature = "tcp")]
+            Content::Segment(_) => self.refill_anew(bytes),
         }
     }
 
     #[inline(never)]
     fn refill_anew(&mut self, bytes: &[u8]) {
         self.len = bytes.len();
-        match &mut self.content {
-            Content::Own(octets) => {
-                octets.clear();
-                octets.extend_from_slice(bytes);
-            }
-            content => *content = Content::Own(bytes.to_vec()),
+        if let Content::Own(octets) = &mut self.content {
+            octets.clear();
+            octets.extend_from_slice(bytes);
+        } else {
+            self.content = Content::Own(bytes.to_vec());
         }
     }
 }

@@ -59,7 +59,13 @@ fn datagrams_that_pile_up_are_named_with_host_socket_and_task() {
                     task.await.unwrap();
                 });
             });
+            let places = match way {
+                "unread" | "to itself" => " 0 bytes are on links, ",
+                "to all" => " in buffers of sockets and 0 in streams",
+                _ => " bytes are on links, 0 in buffers of sockets and 0 in streams",
+            };
             let parts = [
+                places,
                 "too many bytes are under way after a send of the UDP socket 0.0.0.0:49152 of host `a`, used by the task of host `a` that was spawned at ",
                 "byte_limit.rs:",
                 "and its limit is 1048576 bytes. ",

@@ -535,10 +535,9 @@ impl<P: Clone> Network<P> {
 
     /// Returns the number of the link of a path, if the link exists.
     #[inline]
-    fn existing_link(&self, path: Path) -> Result<LinkId, NetworkError> {
-        let Path { from, to } = path;
+    fn existing_link(&self, Path { from, to }: Path) -> Result<LinkId, NetworkError> {
         let exists = from.0 < self.nodes && to.0 < self.nodes && from != to;
-        if exists && let Some(link) = self.places.link(path) { Ok(link) } else { Err(NetworkError::NoLink { from, to }) }
+        if exists && let Some(link) = self.places.link(Path { from, to }) { Ok(link) } else { Err(NetworkError::NoLink { from, to }) }
     }
 
     /// Returns the number of the link of a path. `path` must have checked the path.
