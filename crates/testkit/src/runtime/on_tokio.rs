@@ -213,8 +213,19 @@ pub(crate) fn prepare<'a>(builder: &'a mut Builder, hook: &Arc<Hook>) -> &'a mut
     builder.enable_time().start_paused(true).on_thread_park(move || hook.park())
 }
 
+/// Hook that acts for a run until this value is dropped. The hook and the state of the run hold each other, by the waker of the runtime whose builder keeps the
+/// hook, so that a run left in its hook would stay in memory for ever.
+struct Hooked<'a>(&'a Hook);
+
+impl Drop for Hooked<'_> {
+    fn drop(&mut self) {
+        self.0.set(None);
+    }
+}
+
 /// Run that has begun. The parts of the run are dropped in the order of the fields.
 struct Begun<'a> {
+    _hooked: Hooked<'a>,
     _recorder: Recorder<'a>,
     _entered: Entered,
     tasks: Rc<Tasks>,
@@ -227,7 +238,14 @@ struct Begun<'a> {
 
 impl<'a> Begun<'a> {
     /// Begins a run on this thread.
-    fn new(mut core: Core, hosts: usize, origin: tokio::time::Instant, hook: &Hook, watched: &Watched, recorded: &'a mut Option<Recorded>) -> Self {
+    fn new(
+        mut core: Core,
+        hosts: usize,
+        origin: tokio::time::Instant,
+        hook: &'a Hook,
+        watched: &Watched,
+        recorded: &'a mut Option<Recorded>,
+    ) -> Self {
         let idle = Arc::new(Idle::new(core.settings.limits.until()));
         let executor = Executor::new();
         core.woken.trust(&executor.waker());
@@ -237,7 +255,7 @@ impl<'a> Begun<'a> {
         let entered = enter(&shared, &tasks);
         let recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
         hook.set(Some(Parking { idle: Arc::clone(&idle), shared: Arc::clone(&shared), pulse: Arc::clone(&watched.pulse) }));
-        Self { _recorder: recorder, _entered: entered, tasks, shared, executor, idle, origin }
+        Self { _hooked: Hooked(hook), _recorder: recorder, _entered: entered, tasks, shared, executor, idle, origin }
     }
 }
 
@@ -319,7 +337,6 @@ pub(crate) fn run_beside<F: Future>(
     };
     // All tasks of the runtime live on the host, wherever the tasks were started.
     crate::current::on_host(Some(host), || block_on(pin!(run)));
-    hook.set(None);
     outcome.unwrap_or_else(|| panic!("the runtime was stopped before the end of the program"))
 }
 

@@ -4,9 +4,11 @@ use std::fmt::Debug;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::pin::pin;
+use std::sync::Arc;
 use std::task::{Context, Waker};
 use std::time::Duration;
 
+use cohaptic_testkit::hit::Verdict;
 use cohaptic_testkit::{Bed, Host, TcpListener, TcpSocket, TcpStream, Testbed, ToSocketAddrs, UdpSocket, time};
 
 /// Sockets, listeners and streams that have outlived their run.
@@ -32,6 +34,18 @@ async fn leave(bed: Bed) -> Left {
     let stream = host.connect("b:80").await.unwrap();
     let socket = host.scope(async { TcpSocket::new_v4().unwrap() }).await;
     Left { udp, listener, stream, socket, host, bed }
+}
+
+/// A run leaves nothing in memory, with each executor: laws live as long as the state of the run.
+#[test]
+fn the_state_of_a_run_is_dropped_with_the_run() {
+    for bed in beds() {
+        let of_law = Arc::new(());
+        let held = Arc::downgrade(&of_law);
+        let bed = bed.on_packet("a", "b", move |_| if Arc::strong_count(&of_law) > 0 { Verdict::Pass } else { Verdict::Drop });
+        drop(bed.run(leave));
+        assert_eq!(held.strong_count(), 0);
+    }
 }
 
 /// Returns the output of a future that is ready at its first poll, as it must be.
