@@ -11,7 +11,7 @@ const LEAST_COUNTS: Duration = Duration::from_secs(300);
 
 /// Estimator of RFC 6298 in whole nanoseconds. SRTT is kept times eight and RTTVAR times four, because the gains of 1/8 and 1/4 would otherwise round at each
 /// sample.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct RoundTrips {
     /// Eight times SRTT \[ns\]. Zero before the first sample.
     srtt_8: u64,
@@ -19,11 +19,24 @@ pub(crate) struct RoundTrips {
     var_4: u64,
     /// Least round trip, and the instant at which it was measured.
     least: Option<(Duration, Instant)>,
+    /// Timeout without doublings \[ns\], kept because each segment sets a timer and few acknowledgements change the estimate.
+    base: u64,
+    /// Least part of the variation in the timeout \[ns\].
+    least_variance: u64,
+    /// Bounds of the timeout \[ns\].
+    bounds: (u64, u64),
     /// Number of doublings of the timeout since the last sample.
     pub(crate) backoff: u32,
 }
 
 impl RoundTrips {
+    /// Returns an estimator without samples, with the bounds of `config`.
+    pub(crate) fn new(config: &TcpConfig) -> Self {
+        let bounds = (nanos(config.least_timeout), nanos(config.greatest_timeout));
+        let base = nanos(config.initial_timeout).clamp(bounds.0, bounds.1);
+        Self { srtt_8: 0, var_4: 0, least: None, base, least_variance: nanos(config.least_variance), bounds, backoff: 0 }
+    }
+
     /// Takes a measured round trip into the estimate, and ends the doubling of the timeout. A round trip of zero counts as 1 ns.
     pub(crate) fn sample(&mut self, now: Instant, round_trip: Duration) {
         let nanos = nanos(round_trip).max(1);
@@ -37,6 +50,7 @@ impl RoundTrips {
             self.var_4 = self.var_4 - self.var_4 / 4 + error_8 / 8;
             self.srtt_8 = self.srtt_8 - self.srtt_8 / 8 + nanos;
         }
+        self.base = (self.srtt_8 / 8 + self.var_4.max(self.least_variance)).clamp(self.bounds.0, self.bounds.1);
         self.backoff = 0;
         let is_least = self.least.is_none_or(|(least, at)| round_trip <= least || now.saturating_duration_since(at) > LEAST_COUNTS);
         if is_least {
@@ -45,7 +59,12 @@ impl RoundTrips {
     }
 
     pub(crate) fn srtt(&self) -> Option<Duration> {
-        (self.srtt_8 != 0).then_some(Duration::from_nanos(self.srtt_8 / 8))
+        self.srtt_nanos().map(Duration::from_nanos)
+    }
+
+    /// Returns SRTT \[ns\], or `None` before the first sample.
+    pub(crate) fn srtt_nanos(&self) -> Option<u64> {
+        (self.srtt_8 != 0).then_some(self.srtt_8 / 8)
     }
 
     pub(crate) fn variation(&self) -> Duration {
@@ -56,19 +75,20 @@ impl RoundTrips {
         self.least.map(|(least, _)| least)
     }
 
-    /// Returns SRTT + 4·RTTVAR within the bounds of `config`, without doubling. Before the first sample, returns the initial timeout.
-    pub(crate) fn base_timeout(&self, config: &TcpConfig) -> Duration {
-        // In whole nanoseconds, because every segment asks for the timeout, and sums of `Duration`s carry between seconds and nanoseconds.
-        let timeout = match self.srtt_8 / 8 {
-            0 => nanos(config.initial_timeout),
-            srtt => srtt + self.var_4.max(nanos(config.least_variance)),
-        };
-        Duration::from_nanos(timeout.clamp(nanos(config.least_timeout), nanos(config.greatest_timeout)))
+    /// Returns SRTT + 4·RTTVAR within the bounds of the configuration, without doubling \[ns\]. Before the first sample, returns the initial timeout.
+    pub(crate) const fn base_timeout(&self) -> u64 {
+        self.base
     }
 
-    /// Returns the timeout with its doublings, at most the greatest timeout of `config`.
-    pub(crate) fn timeout(&self, config: &TcpConfig) -> Duration {
-        doubled(self.base_timeout(config), self.backoff, config)
+    /// Returns the timeout with its doublings, at most the greatest timeout of the configuration \[ns\].
+    pub(crate) fn timeout_nanos(&self) -> u64 {
+        // At most 30 doublings, as in [`doubled`].
+        self.base.saturating_mul(1 << self.backoff.min(30)).min(self.bounds.1)
+    }
+
+    /// Returns the timeout with its doublings, at most the greatest timeout of the configuration.
+    pub(crate) fn timeout(&self) -> Duration {
+        Duration::from_nanos(self.timeout_nanos())
     }
 }
 
@@ -79,7 +99,7 @@ pub(crate) fn doubled(base: Duration, times: u32, config: &TcpConfig) -> Duratio
 }
 
 /// Returns the nanoseconds of `span`, at most 1/16 of the range, so that eight times the result does not overflow.
-fn nanos(span: Duration) -> u64 {
+pub(crate) fn nanos(span: Duration) -> u64 {
     u64::try_from(span.as_nanos()).unwrap_or(u64::MAX / 16).min(u64::MAX / 16)
 }
 
@@ -90,10 +110,10 @@ mod tests {
     #[test]
     fn three_round_trips_by_hand() {
         let config = TcpConfig { least_variance: Duration::ZERO, ..TcpConfig::default() };
-        let mut round_trips = RoundTrips::default();
+        let mut round_trips = RoundTrips::new(&config);
         let mut after = |milliseconds| {
             round_trips.sample(Instant::ZERO, Duration::from_millis(milliseconds));
-            [round_trips.srtt().unwrap(), round_trips.variation(), round_trips.timeout(&config)].map(|span| span.as_nanos())
+            [round_trips.srtt().unwrap(), round_trips.variation(), round_trips.timeout()].map(|span| span.as_nanos())
         };
         assert_eq!(after(100), [100_000_000, 50_000_000, 300_000_000]);
         assert_eq!(after(200), [112_500_000, 62_500_000, 362_500_000]);
@@ -102,12 +122,11 @@ mod tests {
 
     #[test]
     fn the_variance_has_a_floor_and_doubling_an_end() {
-        let config = TcpConfig::default();
-        let mut round_trips = RoundTrips::default();
-        assert_eq!(round_trips.timeout(&config), Duration::from_secs(1));
+        let mut round_trips = RoundTrips::new(&TcpConfig::default());
+        assert_eq!(round_trips.timeout(), Duration::from_secs(1));
         round_trips.sample(Instant::ZERO, Duration::from_millis(10));
-        assert_eq!(round_trips.timeout(&config), Duration::from_millis(210));
+        assert_eq!(round_trips.timeout(), Duration::from_millis(210));
         round_trips.backoff = 40;
-        assert_eq!(round_trips.timeout(&config), Duration::from_secs(120));
+        assert_eq!(round_trips.timeout(), Duration::from_secs(120));
     }
 }

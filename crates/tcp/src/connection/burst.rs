@@ -49,7 +49,7 @@ impl Connection {
     /// Returns the rate at which Linux would pace the sender \[byte/s\] (`tcp_update_pacing_rate`), or `None` before the first round trip. This crate paces
     /// nothing; the rate only sets the length of bursts, and a margin of `HyStart`.
     pub(super) fn pacing_rate(&self) -> Option<u64> {
-        let srtt = self.round_trips.srtt()?.as_nanos().max(1);
+        let srtt = u128::from(self.round_trips.srtt_nanos()?.max(1));
         let percent = if self.congestion.window < self.congestion.threshold / 2 { 200 } else { 120 };
         let flight = u128::from(self.congestion.window.max(self.send.board.packets_out())) * self.send.mss as u128;
         Some(u64::try_from(flight * percent * 10_000_000 / srtt).unwrap_or(u64::MAX))

@@ -83,8 +83,7 @@ impl Connection {
         } else {
             self.receive.pushed = (self.receive.pushed + 1).min(2);
         }
-        // Most segments arrive with the segment before.
-        let is_pause = |at: Instant| at != now && now.saturating_duration_since(at) > self.round_trips.base_timeout(&self.config);
+        let is_pause = |at: Instant| now.as_nanos().saturating_sub(at.as_nanos()) > self.round_trips.base_timeout();
         let was_idle = self.receive.last_data_at.is_none_or(is_pause);
         // After a pause of more than a timeout, the peer has a small window again and needs quick acknowledgements to let the window grow.
         if was_idle {

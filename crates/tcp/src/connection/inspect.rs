@@ -53,7 +53,7 @@ impl Connection {
             srtt: self.round_trips.srtt(),
             rttvar: self.round_trips.variation(),
             least_rtt: self.round_trips.least(),
-            timeout: self.round_trips.timeout(&self.config),
+            timeout: self.round_trips.timeout(),
             congestion_window: self.congestion.window,
             slow_start_threshold: self.congestion.threshold,
             ca_state: self.recovery.phase,

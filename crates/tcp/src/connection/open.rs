@@ -14,6 +14,7 @@ use crate::connection::timers::TWO_TICKS;
 use crate::connection::window::{first_window, tuning};
 use crate::error::Error;
 use crate::info::State;
+use crate::rtt::RoundTrips;
 use crate::scoreboard::{Ending, News, Scoreboard};
 use crate::segment::{Flags, Options, Segment, TIMESTAMPS_LENGTH};
 use crate::send_buffer::SendBuffer;
@@ -112,7 +113,7 @@ impl Connection {
             last_heard: now,
             challenged_at: None,
         };
-        let congestion = Congestion::new(&config);
+        let (congestion, round_trips) = (Congestion::new(&config), RoundTrips::new(&config));
         Ok(Self {
             config,
             local,
@@ -122,7 +123,7 @@ impl Connection {
             is_orphan: false,
             send,
             receive,
-            round_trips: Default::default(),
+            round_trips,
             congestion,
             recovery: Default::default(),
             rack: Default::default(),

@@ -102,7 +102,7 @@ impl Connection {
     pub(super) fn end_pause(&mut self, now: Instant) {
         if self.config.slow_start_after_idle {
             let (idle, threshold) = (now.saturating_duration_since(self.send.last_data_at), self.current_threshold());
-            self.congestion.rest(idle, self.round_trips.timeout(&self.config), threshold);
+            self.congestion.rest(idle, self.round_trips.timeout(), threshold);
         }
     }
 

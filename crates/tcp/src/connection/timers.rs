@@ -9,7 +9,7 @@ use crate::config::{Keepalive, TcpConfig};
 use crate::error::Error;
 use crate::info::CaState;
 use crate::info::State;
-use crate::rtt::doubled;
+use crate::rtt::{doubled, nanos};
 
 /// Purpose of the timer of the sending half. As in Linux, the sending half has one timer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -35,8 +35,13 @@ impl Connection {
     /// waits for nothing.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
+        let earlier = |one: Option<Instant>, other: Option<Instant>| match (one, other) {
+            (Some(one), Some(other)) => Some(one.min(other)),
+            (one, other) => one.or(other),
+        };
         let timer = self.timer.map(|(at, _)| at);
-        [timer, self.receive.ack_at, self.keepalive_at, self.linger_until].into_iter().flatten().min()
+        // Every segment asks for the deadline, so that the four are compared one by one, without an iterator.
+        earlier(earlier(timer, self.receive.ack_at), earlier(self.keepalive_at, self.linger_until))
     }
 
     /// Handles all deadlines up to `now`. Does nothing before the instant of [`poll_timeout`](Self::poll_timeout).
@@ -93,19 +98,19 @@ impl Connection {
         let board = &self.send.board;
         let is_wanted = self.config.tail_loss_probe && self.receive.has_sack && matches!(self.recovery.phase, CaState::Open | CaState::Cwr);
         let Some(first) = board.first().filter(|_| is_wanted && self.state.may_send()) else { return false };
-        let mut wait = match self.round_trips.srtt() {
+        // In whole nanoseconds, because every segment sets this timer, and sums of `Duration`s carry between seconds and nanoseconds.
+        let mut wait = match self.round_trips.srtt_nanos() {
             // The peer may delay the acknowledgement of a single segment.
-            Some(srtt) => 2 * srtt + if board.packets_out() == 1 { self.config.least_variance.max(TWO_TICKS) } else { TWO_TICKS },
-            None => self.config.initial_timeout,
+            Some(srtt) => 2 * srtt + nanos(if board.packets_out() == 1 { self.config.least_variance.max(TWO_TICKS) } else { TWO_TICKS }),
+            None => nanos(self.config.initial_timeout),
         };
-        let timeout = self.round_trips.timeout(&self.config);
         // The probe must not come later than the retransmission timer would.
         let from = if has_advanced { now } else { first.at };
-        let left = from.saturating_add(timeout).saturating_duration_since(now);
-        if !left.is_zero() {
+        let left = from.saturating_add_nanos(self.round_trips.timeout_nanos()).as_nanos().saturating_sub(now.as_nanos());
+        if left > 0 {
             wait = wait.min(left);
         }
-        self.timer = Some((now.saturating_add(wait), Timer::TailProbe));
+        self.timer = Some((now.saturating_add_nanos(wait), Timer::TailProbe));
         true
     }
 
@@ -146,7 +151,7 @@ impl Connection {
 
     /// Returns the retransmission timeout, shortened so that the timer runs out when the user timeout ends, but at least 1 ms.
     fn borne_timeout(&self, now: Instant) -> Duration {
-        let timeout = self.round_trips.timeout(&self.config);
+        let timeout = self.round_trips.timeout();
         match (self.config.user_timeout, self.counters.stalled_since) {
             (Some(limit), Some(since)) => timeout.min(limit.saturating_sub(now.saturating_duration_since(since)).max(Duration::from_millis(1))),
             _ => timeout,
@@ -192,7 +197,8 @@ impl Connection {
 
     /// Returns the time to the next probe of a closed window.
     pub(super) fn probe_distance(&self) -> Duration {
-        doubled(self.round_trips.base_timeout(&self.config).max(self.config.least_variance), self.counters.probe_backoff, &self.config)
+        let base = Duration::from_nanos(self.round_trips.base_timeout()).max(self.config.least_variance);
+        doubled(base, self.counters.probe_backoff, &self.config)
     }
 
     /// Handles the end of the timer of a closed window: sends a probe (RFC 9293, section 3.8.6.1), or ends the connection after too many unanswered probes.

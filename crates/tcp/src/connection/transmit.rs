@@ -144,10 +144,10 @@ impl Connection {
         }
         let is_limiting = self.send.board.in_flight() >= self.congestion.window;
         self.congestion.used(self.send.una, end, self.send.board.packets_out(), is_limiting);
-        if was_empty || matches!(self.timer, None | Some((_, Timer::TailProbe | Timer::WindowProbe))) {
+        // The sending half has one timer, and the timer of a tail probe has priority.
+        if !self.set_tail_timer(now, false) && (was_empty || matches!(self.timer, None | Some((_, Timer::TailProbe | Timer::WindowProbe)))) {
             self.set_retransmission_timer(now, was_empty);
         }
-        self.set_tail_timer(now, false);
         // With a scalable congestion control, every segment has a codepoint already.
         if self.send.has_ecn && has_data && !segment.ecn.is_capable() {
             segment.ecn = Ecn::Capable0;
