@@ -246,6 +246,13 @@ impl AddressPlan {
         self.current[host.index()][usize::from(is_six)]
     }
 
+    /// Returns whether the address with the short form `short` is an address of the host, loopback included.
+    #[cfg(feature = "tcp")]
+    #[inline]
+    pub(crate) fn is_own(&self, host: NodeId, short: u32, is_six: bool) -> bool {
+        self.short(host, is_six) == short || Addresses::is_loopback(short, is_six)
+    }
+
     #[inline]
     pub(crate) fn of(&self, host: NodeId) -> Addresses {
         let [four, six] = self.current[host.index()];

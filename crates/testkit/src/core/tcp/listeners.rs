@@ -106,7 +106,7 @@ impl Core {
 
     /// Returns whether `ip` is an address of the host, loopback included.
     pub(super) fn is_own(&self, host: NodeId, ip: IpAddr) -> bool {
-        ip.is_loopback() || self.plan.of(host).has(ip)
+        self.plan.is_own(host, Addresses::short(ip), ip.is_ipv6())
     }
 
     /// Fails if more connections wait than the backlog permits. Linux then drops a SYN, and the ACK that would complete a handshake.

@@ -66,8 +66,10 @@ impl Core {
     /// Sends a segment of a connection, or of no connection, such as a refusal. The segment arrives when [`Core::take_arrivals`] is next called, even over a
     /// link without delay.
     fn emit(&mut self, host: NodeId, connection: Option<ConnId>, segment: Segment<'static>) {
-        let (from, to) = (segment.source.ip(), segment.destination.ip());
-        let path = if self.is_own(host, to) {
+        // Short addresses are compared by their number alone.
+        let addresses = Ends::new(segment.source, segment.destination, Kind::Segment);
+        let Ends { from, to, is_six, .. } = addresses;
+        let path = if self.plan.is_own(host, to, is_six) {
             let Some(path) = self.loopback_of(host) else {
                 self.tcp.loopback.push_back((host, segment));
                 return;
@@ -75,10 +77,9 @@ impl Core {
             path
         } else {
             // The segment is lost if the host has given the source address up, or if no host has the destination any more.
-            let Some(receiver) = self.plan.owner_node(to).filter(|_| self.plan.of(host).has(from)) else { return };
+            let Some(receiver) = self.plan.owner_of(to, is_six).filter(|_| self.plan.short(host, is_six) == from) else { return };
             Path { from: host, to: receiver }
         };
-        let addresses = Ends::new(segment.source, segment.destination, Kind::Segment);
         // The entry is made before the offer, which takes the segment, and noted after the offer, so that the trace has the sending first.
         let happening = self.wire.recording().traces.then(|| self.described(self.wire.next_packet(path), connection, &segment));
         let parcel = self.spare.wrapped(addresses, segment);
