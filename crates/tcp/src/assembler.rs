@@ -29,6 +29,10 @@ pub(crate) struct Assembler {
     segments: VecDeque<Held>,
     /// Memory of `segments` \[byte\].
     ready_memory: usize,
+    /// Number of pieces that came into `ready` since the program last read everything, or since the queue was empty.
+    come: usize,
+    /// Value of `come` when the memory of the queues was last released.
+    expected: usize,
     /// Positions of the octets in `pieces`, with neighbouring pieces joined to one range.
     ranges: Ranges,
     /// One position in each of the at most four ranges that changed last, the latest first (RFC 2018, section 4).
@@ -86,6 +90,11 @@ impl Assembler {
     /// Appends octets in order. Short data may fit into the memory of the segment before.
     fn hold(&mut self, data: Bytes) {
         let octets = data.len();
+        if self.ready.capacity() == 0 {
+            // The next flight mostly has as many segments as the last one or twice as many, and growing piece by piece would copy the queues each time.
+            self.ready.reserve(self.expected);
+            self.segments.reserve(self.expected);
+        }
         if let Some(last) = self.segments.back_mut().filter(|last| last.room >= octets) {
             (last.octets, last.room) = (last.octets + octets, last.room - octets);
         } else {
@@ -95,6 +104,7 @@ impl Assembler {
         }
         if octets > 0 {
             self.unread += octets;
+            self.come += 1;
             self.ready.push_back(data);
         }
     }
@@ -199,9 +209,12 @@ impl Assembler {
                 self.segments.pop_front();
             }
         }
-        // An empty queue keeps its capacity, and an idle connection is to be small.
-        if self.unread == 0 && self.ready.capacity().max(self.segments.capacity()) > KEPT {
-            (self.ready, self.segments) = (VecDeque::new(), VecDeque::new());
+        if self.unread == 0 {
+            let come = core::mem::take(&mut self.come);
+            // An empty queue keeps its capacity, and an idle connection is to be small.
+            if self.ready.capacity().max(self.segments.capacity()) > KEPT {
+                (self.ready, self.segments, self.expected) = (VecDeque::new(), VecDeque::new(), come);
+            }
         }
         count
     }
