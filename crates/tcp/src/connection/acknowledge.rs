@@ -107,7 +107,7 @@ impl Connection {
 
     /// Handles a report of a duplicate that comes after everything was acknowledged. The report may show that the last reduction was needless.
     fn take_late_duplicate(&mut self, now: Instant, segment: &Segment<'_>, ack: &mut Ack) {
-        if self.receive.has_sack {
+        if self.receive.has_sack && !segment.options.sack.as_slice().is_empty() {
             self.take_blocks(segment, self.send.una, self.send.una, ack);
         }
         if ack.tells_duplicate {

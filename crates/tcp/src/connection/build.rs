@@ -43,6 +43,11 @@ impl Connection {
         self.send.has_ecn && self.congestion.is_scalable()
     }
 
+    /// Returns the ECN codepoint of segments without new data.
+    pub(super) const fn codepoint(&self) -> Ecn {
+        if self.is_scalable() { Ecn::Capable1 } else { Ecn::NotCapable }
+    }
+
     /// Returns a segment at the next position without data and options, and with a window of zero.
     fn empty(&self, flags: Flags) -> Segment<'static> {
         Segment {
@@ -53,7 +58,7 @@ impl Connection {
             flags,
             window: 0,
             options: Options::default(),
-            ecn: if self.is_scalable() { Ecn::Capable1 } else { Ecn::NotCapable },
+            ecn: self.codepoint(),
             ttl: self.config.ttl,
             payload: Payload::default(),
         }
@@ -68,11 +73,17 @@ impl Connection {
     /// Returns a segment with the positions from `start` to `end` (exclusive), possibly with the FIN. The segment acknowledges all octets that have arrived in
     /// order, so that no further acknowledgement is due afterwards.
     pub(super) fn build(&mut self, now: Instant, start: Position, end: Position) -> Segment<'static> {
+        self.build_with(now, start, end, (Flags::NONE, self.codepoint()))
+    }
+
+    /// Like [`build`](Self::build), with more flags and a codepoint. Both are given beforehand because a segment is large, and a change afterwards would move
+    /// the segment once more.
+    pub(super) fn build_with(&mut self, now: Instant, start: Position, end: Position, (more, ecn): (Flags, Ecn)) -> Segment<'static> {
         // The FIN has the position after the last octet, so a position beyond the buffer is the FIN.
         let data_end = end.min(self.send.buffer.end()).max(start);
         let payload = self.send.buffer.slice(start, data_end);
         let has_fin = end > data_end;
-        let flags = Flags::ACK
+        let flags = (Flags::ACK | more)
             .with_if(Flags::FIN, has_fin)
             .with_if(Flags::ECE, self.send.tells_mark)
             .with_if(Flags::CWR, self.send.tells_reduction && !payload.is_empty());
@@ -83,7 +94,7 @@ impl Connection {
         let options = self.options(now, payload.len());
         let window = self.offer_window();
         self.has_acknowledged();
-        Segment { sequence: on_wire(start), flags, window, options, payload: payload.into(), ..self.empty(flags) }
+        Segment { sequence: on_wire(start), window, options, ecn, payload: payload.into(), ..self.empty(flags) }
     }
 
     /// Returns timestamps, and as many selective acknowledgements as fit beside `payload` octets of data.

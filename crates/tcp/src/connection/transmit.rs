@@ -27,10 +27,13 @@ impl Connection {
             {
                 return Some(segment);
             }
-            if self.state.may_send()
-                && let Some(segment) = self.lost_again(now).or_else(|| self.new_data(now, false))
-            {
-                return Some(segment);
+            if self.state.may_send() {
+                if let Some(segment) = self.lost_again(now) {
+                    return Some(segment);
+                }
+                if let Some(segment) = self.new_data(now, false) {
+                    return Some(segment);
+                }
             }
             if self.receive.ack_now {
                 return Some(self.build(now, self.send.next, self.send.next));
@@ -67,9 +70,7 @@ impl Connection {
         self.counters.retransmissions += 1;
         self.recovery.again_at.get_or_insert(now);
         self.recovery.undo_left = Some(self.recovery.undo_left.unwrap_or(0) + 1);
-        let mut segment = self.build(now, start, end);
-        segment.flags = segment.flags.with_if(Flags::PSH, pushes);
-        segment
+        self.build_with(now, start, end, (Flags::NONE.with_if(Flags::PSH, pushes), self.codepoint()))
     }
 
     /// Returns the end of the next new segment, if the peer's window has room for a full segment or for all remaining data. A smaller part is not sent, so that
@@ -126,10 +127,11 @@ impl Connection {
         let was_empty = self.send.board.is_empty();
         // New data soon after the arrival of data is an answer.
         let has_answered = self.receive.last_data_at.is_some_and(|at| now.saturating_duration_since(at) < self.config.delayed_ack);
-        let mut segment = self.build(now, start, end);
-        let has_data = !segment.payload.is_empty();
+        // The FIN has the position after the last octet.
+        let data_end = end.min(self.send.buffer.end());
+        let has_data = data_end > start;
         let (is_last, has_several) = self.ends_burst(now, start, end);
-        let pushes = has_data && self.send.pushes.take(start + segment.payload.len() as u64);
+        let pushes = has_data && self.send.pushes.take(data_end);
         if self.send.board.in_flight() == 0 {
             // The curve of CUBIC must not rise during the pause that ends here.
             self.congestion.shift(now.saturating_duration_since(self.send.last_data_at));
@@ -148,12 +150,11 @@ impl Connection {
         if !self.set_tail_timer(now, false) && (was_empty || matches!(self.timer, None | Some((_, Timer::TailProbe | Timer::WindowProbe)))) {
             self.set_retransmission_timer(now, was_empty);
         }
+        let flags = Flags::NONE.with_if(Flags::PSH, pushes || (has_data && is_last && has_several));
         // With a scalable congestion control, every segment has a codepoint already.
-        if self.send.has_ecn && has_data && !segment.ecn.is_capable() {
-            segment.ecn = Ecn::Capable0;
-        }
-        segment.flags = segment.flags.with_if(Flags::PSH, pushes || (has_data && is_last && has_several));
-        segment
+        let codepoint = self.codepoint();
+        let ecn = if self.send.has_ecn && has_data && !codepoint.is_capable() { Ecn::Capable0 } else { codepoint };
+        self.build_with(now, start, end, (flags, ecn))
     }
 
     /// Sets the timer for a probe of the peer's window, unless a segment is on the way whose answer will tell the window.
