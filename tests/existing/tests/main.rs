@@ -2,6 +2,7 @@
 
 use cohaptic_testkit::{Bed, Testbed};
 
+mod aws;
 mod axum;
 mod beds;
 mod descriptors;
