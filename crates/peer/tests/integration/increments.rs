@@ -7,7 +7,7 @@ use cohaptic_peer::coordination::{BuiltInStrategy, LawParameters, LawSettings, L
 use cohaptic_peer::operator::Seen;
 use cohaptic_peer::wire::{Extra, MAX_LEN, Sample, SampleKind};
 use cohaptic_peer::{
-    Age, Ages, Clock, Contact, Coordination, CopyConfig, Device, DeviceConfig, Gains, Hand, Held, Integrator, ObjectCopy, Peer, PeerConfig,
+    Age, Ages, Clock, Contact, Coordination, CopyConfig, Device, DeviceConfig, Exchange, Gains, Hand, Held, Integrator, ObjectCopy, Peer, PeerConfig,
     Reception, RestingDevice, Signal, SimulatedDevice, State,
 };
 use cohaptic_units::Instant;
@@ -47,6 +47,7 @@ fn peer<D: Device<1>>(place: u32, device: D, returns: usize, sends: usize) -> Pe
         coupling: COUPLING,
         tick: TICK,
         compute_delay: false,
+        exchange: Exchange::EACH_TICK,
         own_damping: 0.0,
         enclosure: None,
     };
