@@ -6,4 +6,8 @@ document.querySelector('form').action = page;
 if (kept && !new URLSearchParams(location.search).has('token')) {
   sessionStorage.removeItem('token');
   location.replace(page + '?token=' + encodeURIComponent(kept));
+} else if (page === '/join') {
+  // Guests and people of a study were given an address, and nobody printed a token for them.
+  document.querySelector('form').remove();
+  document.querySelector('p').textContent = 'This address is not valid any more. Ask the person who gave it to you for another one.';
 }

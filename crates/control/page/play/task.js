@@ -29,18 +29,23 @@ function showTask() {
 /** The radius of the target on the canvas; a target without one is a point. */
 const radiusOf = (room) => Math.max(5, (frame.task.radius || 0) * scaleOf(room));
 
-/** The target: a disc as large as its radius, and a cross in the middle. */
+/** The target: a disc as large as its radius, and a cross in the middle. Of a path also the line and its lane, whose half width is the radius. */
 function drawTarget(context, room) {
   const { task } = frame;
   if (!task) return;
   const { x, y } = onCanvas(room, wide(task.at));
   context.strokeStyle = context.fillStyle = ink.accent;
   if (facts.path) {
-    context.globalAlpha = 0.5;
-    context.lineWidth = 1;
+    context.lineJoin = context.lineCap = 'round';
     context.beginPath();
     facts.path.map((point) => onCanvas(room, point)).forEach((at, k) => (k ? context.lineTo(at.x, at.y) : context.moveTo(at.x, at.y)));
-    context.stroke();
+    for (const [alpha, width] of [[0.16, 2 * task.radius * scaleOf(room)], [0.5, 1]]) {
+      context.globalAlpha = alpha;
+      context.lineWidth = width;
+      context.stroke();
+    }
+    context.lineJoin = 'miter';
+    context.lineCap = 'butt';
   }
   context.globalAlpha = 0.16;
   context.beginPath();

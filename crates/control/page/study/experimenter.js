@@ -58,8 +58,10 @@ function show(study) {
     name.scope = 'row';
     const state = connected ? (hidden ? 'page hidden' : 'connected') : 'not connected';
     const cell = make('td');
-    cell.append(make('span', 'pill ' + (connected && !hidden ? 'good' : 'bad'), state));
-    tr.append(name, make('td', '', PAGE_NAMES[page] || page), cell, make('td', 'n', trip === null ? '–' : span(trip, 2)));
+    // Nobody is missed at the last page.
+    const missed = page === 'thanks' || page === 'abandoned' ? '' : 'bad';
+    cell.append(make('span', 'pill ' + (connected && !hidden ? 'good' : missed), state));
+    tr.append(name, make('td', '', PAGE_NAMES[page] || page), cell, make('td', 'n', trip === null || !connected ? '–' : span(trip, 2)));
     return tr;
   });
   replaceIfChanged($('people'), rows);

@@ -28,7 +28,7 @@ function button(text, className, act) {
   return node;
 }
 
-const trialName = ({ number, of, practice }) => (practice ? 'Practice' : 'Trial') + ' ' + number + ' of ' + of;
+const trialName = ({ number, of, practice }) => 'Trial ' + number + ' of ' + of + (practice ? ', for practice' : '');
 
 /** What stands on each page: heading, content, buttons, and what has the focus at first. */
 const PAGES = {

@@ -181,7 +181,7 @@ fn trial(plan: &TrialPlan) -> Value {
 const fn about(after: After) -> &'static str {
     match after {
         After::Trial => "about the last trial",
-        After::Condition => "about the last trials, since the last questions of this kind",
+        After::Condition => "about all trials since these questions were asked last, or since the beginning",
         After::Study => "about the whole study",
     }
 }
