@@ -74,7 +74,7 @@ impl Site {
     /// Moves hand number `hand` by WebSocket frames.
     pub fn hear(&self, hand: usize, sent: &[u8]) {
         let bytes = Bytes { left: sent.to_vec(), place: 0, ends: true, shared: Arc::default() };
-        self.runtime.block_on(hand::hear(Arc::clone(&self.stage), hand, bytes));
+        self.runtime.block_on(hand::hear(Arc::clone(&self.stage) as _, hand, bytes));
     }
 }
 
