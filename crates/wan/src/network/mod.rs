@@ -15,6 +15,7 @@
 mod awaited;
 mod config;
 pub(crate) mod direct_links;
+mod finding;
 pub(crate) mod id;
 mod lines;
 mod on_demand;
@@ -224,8 +225,8 @@ impl<P: Clone> Network<P> {
         Ok(self)
     }
 
-    /// Sets the function from a path and a payload to the number of the packet's flow, for queues with [`FqCoDel`](crate::FqCoDel). Packets with different numbers are
-    /// packets of different flows. Without this function each pair of sender and receiver is a flow.
+    /// Sets the function from a path and a payload to the number of the packet's flow, for queues with [`FqCoDel`](crate::FqCoDel). Packets with different
+    /// numbers are packets of different flows. Without this function each pair of sender and receiver is a flow.
     #[must_use]
     pub fn with_flows(mut self, flow: fn(Path, &P) -> u32) -> Self {
         self.flows = Some(flow);
@@ -526,61 +527,6 @@ impl<P: Clone> Network<P> {
 
     fn link_name(&self, path: Path) -> LinkName {
         LinkName::between(&self.config.nodes[path.from.index()], &self.config.nodes[path.to.index()])
-    }
-
-    #[inline]
-    fn path(&self, from: NodeId, to: NodeId) -> Result<Path, NetworkError> {
-        self.existing_link(Path { from, to }).map(|_| Path { from, to })
-    }
-
-    /// Returns the number of the link of a path, if the link exists.
-    #[inline]
-    fn existing_link(&self, Path { from, to }: Path) -> Result<LinkId, NetworkError> {
-        let exists = from.0 < self.nodes && to.0 < self.nodes && from != to;
-        if exists && let Some(link) = self.places.link(Path { from, to }) { Ok(link) } else { Err(NetworkError::NoLink { from, to }) }
-    }
-
-    /// Returns the number of the link of a path. `path` must have checked the path.
-    #[inline]
-    fn link(&self, path: Path) -> LinkId {
-        self.places.link(path).expect("packets travel on links that there are")
-    }
-
-    /// Returns the number of the link of a path and the link's place in `lines.links`. Makes the link first if links are made on demand.
-    #[inline(always)]
-    fn link_and_place(&mut self, path: Path) -> (LinkId, usize) {
-        let link = self.link(path);
-        (link, self.place(path, link))
-    }
-
-    /// Returns the place in `lines.links` of the link with the number `link`, which is the link of `path`. Makes the link first if links are made on demand.
-    #[inline(always)]
-    fn place(&mut self, path: Path, link: LinkId) -> usize {
-        let place = match &self.lines.on_demand {
-            None => Some(link.index()),
-            Some(on_demand) => on_demand.place(link),
-        };
-        place.unwrap_or_else(|| self.make(path, link))
-    }
-
-    /// Makes a link on demand, and returns its place in `lines.links`. The instant of making changes no answer: an unused link is in its initial state, its
-    /// model begins at [`Instant::ZERO`], and its random numbers are addressed by its name.
-    #[cold]
-    #[inline(never)]
-    fn make(&mut self, path: Path, link: LinkId) -> usize {
-        let name = self.link_name(path);
-        let place = self.lines.links.len();
-        let on_demand = self.lines.on_demand.as_mut().expect("links are missing only where they are made on demand");
-        let model = on_demand.model(path);
-        on_demand.made(link, place);
-        self.is_random |= model.is_random();
-        let line = self.line(&name, model);
-        self.lines.links.push(line);
-        // The list of path counters has one entry per link, in the order of the links.
-        if self.has_uplinks {
-            self.paths.push(0);
-        }
-        place
     }
 
     /// Lets time pass. Inner events happen now, so the next packet finds their result. Mere arrivals wait to be polled.
