@@ -33,6 +33,7 @@
 mod assembly;
 mod content;
 mod context;
+mod expect;
 mod judged;
 mod link_keys;
 mod measures;
@@ -55,6 +56,7 @@ mod topology;
 
 pub use cohaptic_linkfile::{Diagnostic, FileError as SceneError, Fingerprint, KeysOfLinks, LinkChange, LinkKeys, LinkSelector, LinkTable};
 pub use content::{SceneContent, scene_content, scene_content_of_text, scene_text};
+pub use expect::{Bounds, Expect, ExpectDelay, ExpectLoss, ExpectMeasure, ExpectOrientation, ExpectPosition, ExpectTask, ExpectTravel};
 pub use link_keys::{link_key_changes_of_text, link_keys, link_keys_of_text};
 pub use measures::{Measure, MeasureName, Scope};
 pub use model::*;
