@@ -5,9 +5,9 @@ use crate::State;
 /// Ticks at which a peer reads its device and gives the device a new force.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Exchange {
-    /// Ticks from one exchange to the next, at least 1. Tick 0 has an exchange.
+    /// Number of ticks between two exchanges; 0 counts as 1. Tick 0 has an exchange.
     pub every: u32,
-    /// `true` if the coupling uses the reading of the exchange before, because a reading takes an exchange to arrive.
+    /// `true` if the coupling uses the reading of the previous exchange, because a reading takes an exchange to arrive.
     pub late: bool,
 }
 
@@ -55,13 +55,13 @@ impl<const A: usize> Exchanged<A> {
         }
     }
 
-    /// Ends the tick and returns the force that the device keeps over the tick \[N\]. `coupling` is FC of the tick, which the device takes at an exchange.
+    /// Ends the tick and returns the force that the device keeps over the tick \[N\]. `coupling` is FC of the tick; the device takes FC at an exchange.
     pub(crate) const fn hold(&mut self, exchange: Exchange, coupling: [f64; A]) -> [f64; A] {
         if self.until == 0 {
             self.held = coupling;
             self.until = exchange.every;
         }
-        self.until -= 1;
+        self.until = self.until.saturating_sub(1);
         self.held
     }
 }

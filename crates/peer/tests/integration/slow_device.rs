@@ -55,3 +55,13 @@ fn late_readings_at_every_second_tick_move_as_the_reference_says() {
     let expected = [0.005_249_524_637_675_79, -0.011_154_064_835_519_7, 0.003_774_464_098_998_85, -0.005_454_790_302_800_96];
     agree(after_100_ticks(Gains { stiffness: 1000.0, damping: 2.0 }, Exchange { every: 2, late: true }), expected);
 }
+
+/// Zero ticks from one exchange to the next are no pace: such a device exchanges at each tick.
+#[test]
+fn a_device_without_a_pace_exchanges_at_each_tick() {
+    let coupling = Gains { stiffness: 1000.0, damping: 2.0 };
+    for late in [false, true] {
+        let [zero, one] = [0, 1].map(|every| after_100_ticks(coupling, Exchange { every, late }));
+        assert_eq!(zero.map(f64::to_bits), one.map(f64::to_bits), "late: {late}");
+    }
+}
