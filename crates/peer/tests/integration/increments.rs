@@ -160,6 +160,73 @@ proptest! {
     }
 }
 
+/// A device that jumps anywhere within a metre at each tick, so that most displacements have to be rounded.
+struct Jumping(u64);
+
+impl Device<1> for Jumping {
+    fn state(&self) -> State<1> {
+        State { position: [(self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0], velocity: [0.0] }
+    }
+
+    fn advance(&mut self, _now: Instant, _span: Duration, _coupling_force: [f64; 1]) {
+        // Knuth's multiplier for 64 bits.
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    }
+}
+
+/// A displacement is rounded, and so is the sum at the server. After any number of samples both roundings together are those of the latest sample.
+#[test]
+fn errors_of_rounding_do_not_add_up() {
+    let (mut client, mut server) = (peer(0, Jumping(1), 2, 1), server());
+    for tick in 0..20_000 {
+        let sample = client.next_sample(Instant::ZERO);
+        let extra = Extra { receiver: SERVER, numbers: client.extra(0), ..Extra::NONE };
+        client.all_sent();
+        assert_eq!(server.handle_extended(&sample, &extra), Ok(Reception::Newest));
+        let apart = server.seen(Seen::Peer(0)).unwrap()[0] - client.device().state().position[0];
+        assert!(apart.abs() <= f64::EPSILON, "tick {tick}: {apart:e} m");
+        client.device_mut().advance(Instant::ZERO, TICK, [0.0]);
+    }
+}
+
+/// A client that fades in or out is between the object and its sum, also if the latest displacement was late.
+#[test]
+fn a_client_that_fades_is_drawn_to_its_sum() {
+    let (mut peer, mut ages) = (server(), Ages::default());
+    let take = |peer: &mut Peer<1, RestingDevice<1>, BuiltInStrategy<1>>, ages: &mut Ages<1>, sequence| {
+        let (bytes, len) = datagram(0, sequence);
+        let (sample, extra) = Sample::decode_as(&bytes[..len], SampleKind::Increment, 1).unwrap();
+        ages.handle_extended(peer, &sample, &extra).unwrap()
+    };
+    let force = |peer: &mut Peer<1, RestingDevice<1>, BuiltInStrategy<1>>, ages: &mut Ages<1>| {
+        ages.apply(peer);
+        peer.compute(Instant::ZERO).coordination[0]
+    };
+    // The other client stays at its initial position, and the object at zero.
+    let of = |position: f64, velocity: f64| -COUPLING.stiffness * (position + INITIAL[1]) - COUPLING.damping * velocity;
+    ages.set(&mut peer, 0, Age { weight: 0.5, share: 1.0 });
+    assert_eq!(take(&mut peer, &mut ages, 3), Reception::Newest);
+    let newest = INITIAL[0] + displacement(0, 3);
+    assert_eq!(force(&mut peer, &mut ages), of(0.5 * newest, 0.5 * velocity(0, 3)));
+    assert_eq!(take(&mut peer, &mut ages, 2), Reception::Added);
+    let sum = newest + displacement(0, 2);
+    assert_eq!(force(&mut peer, &mut ages), of(0.5 * sum, 0.5 * velocity(0, 3)));
+    // The client is gone, moves unheard of, and returns: the share counts from the place that acted before.
+    ages.set(&mut peer, 0, Age::GONE);
+    assert_eq!(force(&mut peer, &mut ages), of(0.0, 0.0));
+    ages.await_return(&mut peer, 0, 8);
+    assert_eq!(take(&mut peer, &mut ages, 5), Reception::Newest);
+    assert!(!ages.take_return(0));
+    assert_eq!(take(&mut peer, &mut ages, 8), Reception::Newest);
+    assert!(ages.take_return(0));
+    let before = sum + displacement(0, 5);
+    let after = before + displacement(0, 8);
+    ages.set(&mut peer, 0, Age { weight: 1.0, share: 0.25 });
+    assert_eq!(force(&mut peer, &mut ages), of(0.75 * before + 0.25 * after, 0.75 * velocity(0, 5) + 0.25 * velocity(0, 8)));
+    ages.set(&mut peer, 0, Age::WHOLE);
+    assert_eq!(force(&mut peer, &mut ages), of(after, velocity(0, 8)));
+}
+
 /// A state that is set from outside begins a new sum.
 #[test]
 fn a_held_state_begins_a_new_sum() {
