@@ -94,9 +94,15 @@ mod tests {
         // The second call finds the socket gone and does nothing.
         bound.remove(port(false, 7), SocketId(3));
         assert_eq!(at(&bound, port(false, 7)), [2, 5]);
+        // The order stays, also where the first of several sockets goes.
+        bound.add(port(false, 7), SocketId(6));
+        bound.add(port(false, 7), SocketId(7));
         bound.remove(port(false, 7), SocketId(2));
-        assert_eq!(at(&bound, port(false, 7)), [5]);
+        assert_eq!(at(&bound, port(false, 7)), [5, 6, 7]);
         bound.remove(port(false, 7), SocketId(5));
+        assert_eq!(at(&bound, port(false, 7)), [6, 7]);
+        bound.remove(port(false, 7), SocketId(6));
+        bound.remove(port(false, 7), SocketId(7));
         assert!(at(&bound, port(false, 7)).is_empty());
         assert_eq!(at(&bound, port(true, 7)), [1]);
         assert_eq!([at(&bound, port(false, 8)), at(&bound, port(false, 9))], [[4], [0]]);

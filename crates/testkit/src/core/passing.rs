@@ -312,9 +312,9 @@ impl Core {
         Err(self.lose(path, &parcel))
     }
 
-    /// Returns the socket of `host` that receives the packet, if the socket [hears](SocketState::hears) the packet, which the caller checks. A socket connected
-    /// to the sender comes before an unconnected socket, then a socket bound to the address before a socket bound to all addresses, then the socket that was
-    /// bound last.
+    /// Returns the socket of `host` for the packet. A socket connected to the sender comes before an unconnected socket, then a socket bound to the address
+    /// before a socket bound to all addresses, then the socket bound last. The only socket of a port is returned unseen: the caller asks whether the socket
+    /// [hears](SocketState::hears) the packet.
     #[inline(always)]
     fn socket_for(&self, host: NodeId, ends: &Ends) -> Option<SocketId> {
         if !self.has_address(host, ends) {

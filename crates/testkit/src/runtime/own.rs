@@ -445,3 +445,33 @@ pub(crate) fn time_stands_still(shared: &Shared, polls: u64, last: Option<&Task>
         Seconds(now)
     );
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Task of another executor, which this executor is.
+    struct Main;
+
+    impl Wake for Main {
+        fn wake(self: Arc<Self>) {}
+    }
+
+    #[test]
+    fn an_executor_leaves_nothing_on_its_thread() {
+        let mains = [Arc::new(Main), Arc::new(Main)];
+        let count = || mains.each_ref().map(Arc::strong_count);
+        let [first, second] = mains.each_ref().map(|main| {
+            let executor = Executor::new();
+            executor.begin(Some(&Waker::from(Arc::clone(main))));
+            executor
+        });
+        // The thread holds the waker of the second executor, and each executor holds its own.
+        assert_eq!(count(), [2, 3]);
+        drop(first);
+        assert_eq!(count(), [1, 3]);
+        second.waker().wake_by_ref();
+        drop(second);
+        assert_eq!(count(), [1, 1]);
+    }
+}
