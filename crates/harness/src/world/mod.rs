@@ -544,7 +544,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> Receivers<'_, A, S, E> {
                     observer.on_hold(&HoldRow { at: now, from: event.path.from.index(), to, sampled: event.offered })?;
                 }
                 // `None`: the datagram waits in the outbox of the remote peers.
-                // `Added`: the held sample is still a newer one, so that nothing is held from now on.
+                // `Added`: a later sample is held already, so no hold begins.
                 None | Some(Ok(Reception::Newest | Reception::Added)) => {}
                 Some(Ok(Reception::Stale)) => receiver.stale_samples += 1,
                 Some(Err(_)) if event.damage.is_some() => receiver.refused_samples += 1,

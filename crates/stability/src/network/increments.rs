@@ -4,8 +4,8 @@ use cohaptic_scene::Scene;
 
 use crate::AnalysisError;
 
-/// Refuses a scene whose clients send displacements over a line that does more than delay all samples alike. Where every displacement arrives once and in order,
-/// the sum at the server is the position of the device.
+/// Refuses a scene whose clients send displacements over a line that does more than delay all samples alike. Where every displacement arrives once and in
+/// order, the sum at the server is the position of the device.
 pub(super) fn refuse_lost_increments(scene: &Scene) -> Result<(), AnalysisError> {
     let Some(server) = scene.server().filter(|_| scene.sends_increments()) else { return Ok(()) };
     let (name, downlink) = (&scene.peers[server].name, scene.peers[server].downlink.as_deref());

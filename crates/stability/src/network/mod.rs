@@ -65,8 +65,8 @@ impl NominalNetwork {
     /// # Errors
     ///
     /// [`AnalysisError`] if the fates of samples never repeat, because a queue is offered more than its rate or because periods do not meet; if too many
-    /// peers share lines; if the scene has a topology; if peers send only on changes (dead bands); if clients send displacements over a line that does more than
-    /// delay; or if an operator with the law crossover holds a device of an object that turns.
+    /// peers share lines; if the scene has a topology; if peers send only on changes (dead bands); if clients send displacements over a line that does more
+    /// than delay; or if an operator with the law crossover holds a device of an object that turns.
     pub fn of(scene: &Scene) -> Result<Self, AnalysisError> {
         refuse_topology(scene, "this analysis")?;
         if scene.rotation.is_some() {

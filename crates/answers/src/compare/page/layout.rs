@@ -43,8 +43,8 @@ impl Layout {
         self.facets.iter().map(|(_, count)| count).product()
     }
 
-    /// Returns the number of panels side by side. If several keys have panels, a row has the values of the last one, so that panels which differ in nothing else
-    /// stand beside each other.
+    /// Returns the number of panels side by side. If several keys have panels, a row has the values of the last key, so that panels which differ in nothing
+    /// else stand beside each other.
     pub(super) fn columns(&self) -> usize {
         match self.facets.as_slice() {
             [_, .., (_, last)] if *last <= MOST_COLUMNS => *last,
