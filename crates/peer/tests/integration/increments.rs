@@ -160,12 +160,13 @@ proptest! {
     }
 }
 
-/// A device that jumps anywhere within a metre at each tick, so that most displacements have to be rounded.
+/// A device that jumps anywhere within a metre at each tick. Cubes have bits of many magnitudes, so that most displacements have to be rounded.
 struct Jumping(u64);
 
 impl Device<1> for Jumping {
     fn state(&self) -> State<1> {
-        State { position: [(self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0], velocity: [0.0] }
+        let even = (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
+        State { position: [even * even * even], velocity: [0.0] }
     }
 
     fn advance(&mut self, _now: Instant, _span: Duration, _coupling_force: [f64; 1]) {
