@@ -152,9 +152,15 @@ fn what_was_read_or_lost_counts_no_more() {
         "delay 1ms loss 50% ecn",
         "loss 100%",
     ];
-    for link in words {
-        Testbed::new(["a", "b"]).links(link).byte_limit(20_000).hit("a", "b", "behind 1 packet 5; duplicate packet 9").seed(3).run(
-            |bed| async move {
+    // Into the smaller buffer one datagram fits, and others are lost there.
+    for (link, room) in words.into_iter().flat_map(|link| [(link, 1 << 20), (link, 2500)]) {
+        Testbed::new(["a", "b"])
+            .links(link)
+            .receive_buffer(room)
+            .byte_limit(20_000)
+            .hit("a", "b", "behind 1 packet 5; duplicate packet 9")
+            .seed(3)
+            .run(|bed| async move {
                 let client = bed.host("a").bind("0.0.0.0:0").unwrap();
                 let mut server = bed.host("b").bind("0.0.0.0:7").unwrap();
                 for turn in 0..1000 {
@@ -178,8 +184,7 @@ fn what_was_read_or_lost_counts_no_more() {
                         _ => while server.try_recv(&mut [0; 800]).is_ok() {},
                     }
                 }
-            },
-        );
+            });
     }
 }
 
