@@ -74,16 +74,6 @@ pub enum StudyError {
 }
 
 impl StudyError {
-    /// Returns `true` if the state of the system or of its files is the cause, `false` if the input makes no sense.
-    #[must_use]
-    pub const fn is_io(&self) -> bool {
-        match self {
-            Self::Busy { .. } | Self::Damaged { .. } | Self::File { .. } => true,
-            Self::Study(error) => error.is_io(),
-            Self::Refused(_) | Self::Other { .. } | Self::Foreign { .. } | Self::NoStudy { .. } | Self::Nobody { .. } => false,
-        }
-    }
-
     pub(crate) fn damaged(path: &Path, message: impl Into<String>) -> Self {
         Self::Damaged { path: path.to_path_buf(), message: message.into() }
     }

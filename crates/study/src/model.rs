@@ -83,8 +83,6 @@ pub struct Factor {
     pub column: String,
     /// Type of the column.
     pub kind: Kind,
-    /// Values as written, indexed by value.
-    pub texts: Vec<String>,
 }
 
 /// A condition: one value of each factor.
@@ -94,6 +92,8 @@ pub struct Condition {
     pub overrides: Vec<String>,
     /// Values for the table, indexed by factor.
     pub values: Vec<Value>,
+    /// Values as written, indexed by factor.
+    pub texts: Vec<String>,
     /// Short text for people and for the report: the values as written.
     pub label: String,
 }

@@ -131,7 +131,7 @@ fn least_p(units: usize) -> f64 {
 fn conditions(study: &Study) -> Html {
     let head = study.factors.iter().fold(Table::new().column("condition"), |table, factor| table.column(factor.key.as_str()));
     let table = study.conditions.iter().enumerate().fold(head, |table, (place, condition)| {
-        let values = condition.label.split(", ").map(Html::from);
+        let values = condition.texts.iter().map(|text| Html::text(text));
         let first = if place == 0 { " (the first)" } else { "" };
         table.row(std::iter::once(Html::text(&format!("{}{first}", place + 1))).chain(values))
     });

@@ -77,13 +77,17 @@ pub fn differences_to_first(rows: &[Vec<f64>], seed: u64) -> Vec<Difference> {
     all
 }
 
-/// Returns the effect size d_z (Cohen 1988): the mean over the standard deviation; `None` for fewer than two values or equal values.
+/// Returns the effect size d_z (Cohen 1988): the mean over the standard deviation; `None` for fewer than two values, and for values that differ by rounding
+/// alone.
 #[must_use]
 pub fn effect(differences: &[f64]) -> Option<f64> {
     let n = float(differences.len());
     let mean = differences.iter().sum::<f64>() / n;
     let variance = differences.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / (n - 1.0);
-    (differences.len() > 1 && variance > 0.0).then(|| mean / libm::sqrt(variance))
+    let deviation = libm::sqrt(variance);
+    // Equal values can have a mean that is rounded, and then a deviation from the mean of about 1e-16 of their size. An effect of 1e16 would be no finding.
+    let rounding = 1e-12 * differences.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    (differences.len() > 1 && deviation > rounding).then(|| mean / deviation)
 }
 
 /// Returns the two-sided p of the sign flip test (Fisher 1935): the share of all choices of signs of the differences whose sum is at least as far from zero as
@@ -159,6 +163,15 @@ mod tests {
         assert!((second.effect.unwrap() - 1.909_078).abs() < 5e-7);
         // Two equal p: both are doubled.
         assert_eq!((second.p_holm, third.p_holm), (0.0625, 0.0625));
+    }
+
+    #[test]
+    fn equal_differences_have_no_effect_size() {
+        // 0.1 three times has the mean 0.10000000000000002, and a deviation of 1.7e-17.
+        for equal in [vec![0.1; 3], vec![-0.7; 7], vec![0.0; 5], vec![0.3], Vec::new()] {
+            assert_eq!(effect(&equal), None, "{equal:?}");
+        }
+        assert!((effect(&[1e-9, 2e-9]).unwrap() - 1.5 * core::f64::consts::SQRT_2).abs() < 1e-9);
     }
 
     #[test]

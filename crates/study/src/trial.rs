@@ -43,8 +43,8 @@ impl Study {
     }
 
     /// Reads the scene of a condition, as people play it.
-    pub(crate) fn check_condition(&self, condition: usize) -> Result<(), FileError> {
-        self.scene_with(condition, []).map(|_| ())
+    pub(crate) fn condition_scene(&self, condition: usize) -> Result<TrialScene, FileError> {
+        self.scene_with(condition, [])
     }
 
     fn scene_with(&self, condition: usize, more: impl IntoIterator<Item = String>) -> Result<TrialScene, FileError> {

@@ -70,6 +70,12 @@ impl Run {
         };
         Self { differences: analysis.measures.iter().map(measure).collect() }
     }
+
+    /// Returns whether the run has figures of each measure in each condition but the first.
+    fn is_of(&self, study: &Study) -> bool {
+        let is_whole = |figures: &Vec<Option<[f64; 3]>>| figures.len() + 1 == study.conditions.len();
+        self.differences.len() == study.measures.len() && self.differences.iter().all(is_whole)
+    }
 }
 
 impl StudyFolder {
@@ -101,7 +107,8 @@ impl StudyFolder {
 fn run_of(study: &Study, number: u64, path: &Path, watch: &dyn Watch) -> Result<Option<Run>, StudyError> {
     if path.exists() {
         let text = read_text(path).map_err(StudyError::file("read", path))?;
-        return serde_json::from_str(&text).map(Some).map_err(|error| StudyError::damaged(path, error.to_string()));
+        let run: Run = serde_json::from_str(&text).map_err(|error| StudyError::damaged(path, error.to_string()))?;
+        return if run.is_of(study) { Ok(Some(run)) } else { Err(StudyError::damaged(path, "it has figures of other measures or conditions")) };
     }
     // Another seed: other persons, other seeds of trials, other shuffled orders.
     let seed = Stream::new(study.seed, b"study dry run").packet(number).first(Purpose::Study) >> 11;

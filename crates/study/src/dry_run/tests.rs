@@ -142,6 +142,9 @@ fn a_longer_delay_is_found_and_the_kept_runs_are_the_same_again() {
     assert_eq!(kept.power(4, &StopAfter(AtomicUsize::new(0))).unwrap().as_ref(), Some(&power));
     assert_eq!(kept.power(5, &StopAfter(AtomicUsize::new(0))).unwrap(), None);
     assert_eq!(kept.power(5, &NoWatch).unwrap().unwrap().times, 5);
+    fs::write(folder.path().join("dry-runs/00004.json"), "{\"differences\":[[null]]}").unwrap();
+    let refused = kept.power(5, &NoWatch).unwrap_err().to_string();
+    assert!(refused.contains("00004.json") && refused.contains("other measures"), "{refused}");
     let lines = power_lines(&study, &power);
     assert_eq!(lines.len(), 3);
     assert!(lines[1].starts_with("task_time_s  "), "{lines:?}");

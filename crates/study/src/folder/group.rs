@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::codes::{GroupCode, PersonCode};
 use crate::error::StudyError;
-use crate::model::Study;
+use crate::model::{Question, Study};
 use crate::sequence::{EndedTrial, Event, GivenAnswer, Sequence, Step};
 
 /// A session as it is kept.
@@ -58,6 +58,10 @@ impl Group {
 
     pub(crate) fn is_done(&self) -> bool {
         matches!(&self.state, GroupState::Session(session) if session.step() == Step::Done)
+    }
+
+    pub(crate) const fn is_forgotten(&self) -> bool {
+        matches!(self.state, GroupState::Forgotten { .. })
     }
 
     /// Returns the state in a word, as in the tables.
@@ -114,7 +118,9 @@ impl Group {
             let session = Sequence::restored(study, code, head.slot, events).map_err(|error| refused(error.to_string()))?;
             GroupState::Session(Box::new(session))
         } else {
-            let answers = (2..).zip(lines).map(|(number, line)| parse(number, line)).collect::<Result<_, String>>().map_err(refused)?;
+            let answer =
+                |(number, line)| parse(number, line).and_then(|answer| if is_of(study, &answer) { Ok(answer) } else { Err(no_answer(number)) });
+            let answers = (2..).zip(lines).map(answer).collect::<Result<_, String>>().map_err(refused)?;
             GroupState::Forgotten { persons: head.forgotten, answers }
         };
         Ok(Self { code, slot: head.slot, state })
@@ -124,6 +130,19 @@ impl Group {
 fn line(of: &impl Serialize) -> String {
     // Structures of numbers and words, without maps whose keys are no text.
     serde_json::to_string(of).expect("a line of a session is written") + "\n"
+}
+
+/// Returns whether an answer is one to a question of the study. The session of a forgotten person has no events, by which its answers would be checked.
+fn is_of(study: &Study, answer: &GivenAnswer) -> bool {
+    let question = study.questions.get(answer.question);
+    let has_values = |question: &Question| answer.values.len() == question.values() && answer.values.iter().all(|value| question.accepts(*value));
+    answer.seat < study.group_size()
+        && answer.condition.is_none_or(|condition| condition < study.conditions.len())
+        && question.is_some_and(has_values)
+}
+
+fn no_answer(number: usize) -> String {
+    format!("line {number}: this answers no question of the study")
 }
 
 fn parse<'a, T: Deserialize<'a>>(number: usize, line: &'a str) -> Result<T, String> {

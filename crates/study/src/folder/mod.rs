@@ -72,8 +72,11 @@ impl StudyFolder {
 
     /// Like [`StudyFolder::open`], for a dry run with modelled persons.
     pub(crate) fn begin(study: Study, path: &Path, program: &str, is_dry: bool) -> Result<Self, StudyError> {
-        let is_begun = Self::is_begun(path)?;
+        // A foreign folder is refused before the lock is written into it.
+        Self::is_begun(path)?;
         let own = Self::taken(path)?;
+        // Asked again, because another process may have begun a study before this one had the lock.
+        let is_begun = Self::is_begun(path)?;
         let kept = KeptStudy::of(&study, is_dry);
         let file = path.join(STUDY);
         if is_begun {
@@ -180,15 +183,20 @@ impl StudyFolder {
         Ok(Some(group))
     }
 
-    /// Removes folders of trials without a session: the trials of forgotten persons.
+    /// Removes the trials of forgotten persons, which a crash may have left. A trial that no session knows has lost the file of its session, or a part of it:
+    /// the motion of people is never removed for this.
     fn sweep(&self) -> Result<(), StudyError> {
         let folder = self.path.join(TRIALS);
         for name in names(&folder)? {
             let Ok(code) = name.parse::<TrialCode>() else { continue };
-            let is_known = self.groups.get(code.group.index()).is_some_and(|group| group.ended().len() >= code.number);
-            if !is_known {
-                let path = folder.join(name);
-                fs::remove_dir_all(&path).map_err(StudyError::file("remove", &path))?;
+            let path = folder.join(name);
+            match self.groups.get(code.group.index()) {
+                Some(group) if group.ended().len() >= code.number => {}
+                Some(group) if group.is_forgotten() => fs::remove_dir_all(&path).map_err(StudyError::file("remove", &path))?,
+                Some(_) | None => {
+                    let session = self.group_file(code.group);
+                    return Err(StudyError::damaged(&session, format!("it does not say that the trial {code} has ended, and the trial is there")));
+                }
             }
         }
         Ok(())

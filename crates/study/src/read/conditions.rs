@@ -1,6 +1,6 @@
 //! Reader of `[conditions]`: the product of the values of some keys of the scene.
 
-use cohaptic_campaign::Variation;
+use cohaptic_campaign::{Variation, split_at_commas};
 use cohaptic_linkfile::document::{Node, Value, quote, value_text};
 use cohaptic_linkfile::reading::{Context, values};
 
@@ -9,7 +9,7 @@ use crate::model::{Condition, Factor};
 /// Reads the factors and their product. Without the table there is one condition, the scene as written.
 pub(super) fn read_conditions(node: Option<&Node>, most: usize, context: Context<'_>) -> Option<(Vec<Factor>, Vec<Condition>)> {
     let Some(node) = node else {
-        return Some((Vec::new(), vec![Condition { overrides: Vec::new(), values: Vec::new(), label: "scene".to_owned() }]));
+        return Some((Vec::new(), vec![Condition { overrides: Vec::new(), values: Vec::new(), texts: Vec::new(), label: "scene".to_owned() }]));
     };
     let Some(table) = node.as_table() else {
         context.fault_at(node, format!("found {}: expected a table such as {{ \"link.delay\" = [\"0ms\", \"100ms\"] }}", node.describe()));
@@ -23,12 +23,7 @@ pub(super) fn read_conditions(node: Option<&Node>, most: usize, context: Context
         return None;
     };
     let conditions = (0..count).map(|condition| of_places(&places(condition, &variations), &variations)).collect();
-    let factors = variations.iter().map(|factor| Factor {
-        key: factor.key().to_owned(),
-        column: factor.column(),
-        kind: factor.kind(),
-        texts: (0..factor.count()).map(|place| factor.value_text(place).to_owned()).collect(),
-    });
+    let factors = variations.iter().map(|factor| Factor { key: factor.key().to_owned(), column: factor.column(), kind: factor.kind() });
     Some((factors.collect(), conditions))
 }
 
@@ -46,9 +41,7 @@ fn read_factor(key: &str, node: &Node, context: Context<'_>) -> Option<Variation
     }
     let written = elements.iter().map(|element| match &element.value {
         // A word stands as it is, as in a campaign: a strategy may have settings in braces.
-        Value::Text(text) if !text.contains([',', '"', '\'', '[', '\n']) && !text.contains("..") && text.trim() == text && !text.is_empty() => {
-            text.clone()
-        }
+        Value::Text(text) if is_word(text) => text.clone(),
         Value::Text(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) | Value::Date | Value::List(_) | Value::Table(_) => {
             value_text(element)
         }
@@ -61,6 +54,12 @@ fn read_factor(key: &str, node: &Node, context: Context<'_>) -> Option<Variation
             None
         }
     }
+}
+
+/// Returns whether a text stands in a list of values as it is, without quotes.
+fn is_word(text: &str) -> bool {
+    let is_plain = !text.contains(['"', '\'', '[', '\n']) && !text.contains("..") && text.trim() == text && !text.is_empty();
+    is_plain && split_at_commas(text).len() == 1
 }
 
 /// Returns the index of the value of each factor in a condition. The last factor varies fastest.
@@ -76,9 +75,11 @@ fn places(condition: usize, factors: &[Variation]) -> Vec<usize> {
 
 fn of_places(places: &[usize], factors: &[Variation]) -> Condition {
     let chosen = || places.iter().zip(factors);
+    let texts: Vec<String> = chosen().map(|(place, factor)| factor.value_text(*place).trim_matches('"').to_owned()).collect();
     Condition {
         overrides: chosen().flat_map(|(place, factor)| factor.overrides(*place)).collect(),
         values: chosen().map(|(place, factor)| factor.value(*place)).collect(),
-        label: chosen().map(|(place, factor)| factor.value_text(*place).trim_matches('"')).collect::<Vec<_>>().join(", "),
+        label: texts.join(", "),
+        texts,
     }
 }

@@ -16,6 +16,7 @@ use cohaptic_scene::{Measure, MeasureName, PeerKind, Scene, Scope, scene_content
 use cohaptic_units::print::Counted;
 
 use crate::model::{Breaks, Order, Person, Study};
+use crate::trial::TrialScene;
 use keys::{ANALYSIS, BREAK, OPERATOR, ORDERS, STUDY};
 
 pub use keys::ROOT;
@@ -47,7 +48,7 @@ impl Study {
         let study = parse_with(Sources { file, text, overrides: &[] }, reader, read_document)?.whole;
         // Every condition is read once here: a fault must not wait until a group comes to its trial.
         for condition in 0..study.conditions.len() {
-            study.check_condition(condition)?;
+            study.condition_scene(condition)?;
         }
         Ok(study)
     }
@@ -84,7 +85,8 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Study> {
         }
     };
     let scene = header.scene.as_ref().and_then(|(path, text)| read_scene(header.scene_node?, path, text, context));
-    let conditions = conditions::read_conditions(root.get("conditions"), MOST_CONDITIONS, context);
+    let conditions_node = root.get("conditions");
+    let conditions = conditions::read_conditions(conditions_node, MOST_CONDITIONS, context);
     let questions = questions::read_questions(root.get("questions"), context);
     let measures = root.read("analysis", |node, context| read_analysis(node, scene.as_ref(), context));
     let operator = root.table("operator", read_operator);
@@ -106,7 +108,7 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Study> {
     }
     let (factors, conditions) = conditions?;
     let (scene_file, scene_text) = header.scene?;
-    Some(Study {
+    let study = Study {
         file: context.sources.file.to_path_buf(),
         text: context.sources.text.to_owned(),
         files: header.files,
@@ -128,7 +130,40 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Study> {
         measures: measures?,
         limit: limit(&scene),
         operator: operator?,
+    };
+    if let Some(node) = conditions_node
+        && let Some(message) = unfit_condition(&study)
+    {
+        context.fault_at(node, message);
+        return None;
+    }
+    Some(study)
+}
+
+/// Returns why a condition changes what all conditions share, in words; `None` if none does. A condition whose scene is refused has a message of its own.
+fn unfit_condition(study: &Study) -> Option<String> {
+    study.conditions.iter().enumerate().find_map(|(place, condition)| {
+        let TrialScene { text, scene, .. } = study.condition_scene(place).ok()?;
+        let unfit = unkept(&scene, &text, &study.scene_file).or_else(|| {
+            (hands(&scene) != study.hands).then(|| format!("the pointers are {}: expected {}", hands(&scene).join(", "), study.hands.join(", ")))
+        });
+        let other_limit = || {
+            let message =
+                || format!("a task may take {:?}, and {:?} in the scene: expected the same time in all conditions", limit(&scene), study.limit);
+            (limit(&scene) != study.limit).then(message)
+        };
+        unfit.or_else(other_limit).map(|message| format!("in the condition {}, {message}", quote(&condition.label)))
     })
+}
+
+/// Returns why a study could not keep all of a scene, in words; `None` for a scene that is kept as a whole.
+fn unkept(scene: &Scene, text: &str, path: &Path) -> Option<String> {
+    let content = scene_content_of_text(text, path, &[]).ok()?;
+    if let Some(name) = content.files.keys().next() {
+        return Some(format!("the scene names the file {name}, and a study keeps nothing but the scene: expected a scene without other files"));
+    }
+    let peer = scene.peers.iter().find(|peer| matches!(peer.kind, PeerKind::Udp(_) | PeerKind::Falcon(..)))?;
+    Some(format!("peer {} is a {}: expected peers of kind pointer, for people, or simulated", quote(&peer.name), peer.kind.name()))
 }
 
 fn read_header<'a>(node: &'a Node, context: Context<'a>) -> Option<Header<'a>> {
@@ -183,29 +218,20 @@ fn read_named(node: &Node, expected: &str, files: &mut BTreeMap<String, String>,
 
 /// Reads the scene as for a session, and refuses scenes of which a study cannot keep everything.
 fn read_scene(node: &Node, path: &Path, text: &str, context: Context<'_>) -> Option<Scene> {
-    let read = Scene::parse_live(text, path, &[]).and_then(|scene| scene_content_of_text(text, path, &[]).map(|content| (scene, content)));
-    let (scene, content) = match read {
-        Ok(read) => read,
+    let scene = match Scene::parse_live(text, path, &[]) {
+        Ok(scene) => scene,
         Err(error) => {
             // The scene's own message has its place in the scene file.
             context.fault_at(node, format!("the scene is refused: {error}\nexpected a scene that can be run"));
             return None;
         }
     };
-    if let Some(name) = content.files.keys().next() {
-        context.fault_at(
-            node,
-            format!("the scene names the file {name}, and a study keeps nothing but the scene: expected a scene without other files"),
-        );
+    if let Some(message) = unkept(&scene, text, path) {
+        context.fault_at(node, message);
         return None;
     }
     if scene.task.is_none() {
         context.fault_at(node, "the scene has no task: expected a table [task], of which a trial is one run");
-        return None;
-    }
-    if let Some(peer) = scene.peers.iter().find(|peer| matches!(peer.kind, PeerKind::Udp(_) | PeerKind::Falcon(..))) {
-        let message = format!("peer {} is a {}: expected peers of kind pointer, for people, or simulated", quote(&peer.name), peer.kind.name());
-        context.fault_at(node, message);
         return None;
     }
     Some(scene)

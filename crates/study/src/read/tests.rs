@@ -15,6 +15,7 @@ fn read(from: &str, to: &str) -> Result<Study, String> {
         fs::write(folder.path().join(name), text.replace(from, to)).unwrap();
     }
     assert!(found > 0, "nothing says {from:?}");
+    fs::write(folder.path().join("delays.csv"), "10\n20\n").unwrap();
     Study::read(&folder.path().join("study.toml")).map_err(|error| error.to_string())
 }
 
@@ -52,10 +53,76 @@ fn every_refusal_has_a_place_and_a_way_out() {
         ("\"consent.md\"", "\"consnet.md\"", "study.toml:13:11: study.consent", "cannot read"),
         ("[task]\nkind = \"reach\"", "[tsak]\nkind = \"reach\"", "study.toml:5:9: study.scene", "did you mean \"task\"?"),
         ("kind = \"pointer\"", "kind = \"simulated\"", "study.toml:5:9: study.scene", "no pointer"),
+        (
+            "\"link.delay\" =",
+            "\"peers.left.kind\" = [\"pointer\", \"simulated\"]\n\"link.delay\" =",
+            "study.toml:16:1: conditions",
+            "the pointers are right",
+        ),
+        ("\"link.delay\" =", "\"scene.duration\" = [\"30s\", \"10s\"]\n\"link.delay\" =", "study.toml:16:1: conditions", "the same time in all"),
+        (
+            "\"link.delay\" = [\"0ms\", \"100ms\"]",
+            "link = [{ delay = \"0ms\" }, { trace = \"delays.csv\" }]",
+            "study.toml:16:1: conditions",
+            "names the file delays.csv",
+        ),
         ("[analysis]\nmeasures", "[analysis]\nmeasure", "study.toml:33:1: analysis.measure", "did you mean \"measures\"?"),
     ] {
         let error = read(from, to).expect_err(to);
         assert!(error.contains(place) && error.contains(words), "{to}:\n{error}");
         assert!(error.contains("expected"), "{to}:\n{error}");
+    }
+}
+
+#[test]
+fn a_value_may_have_commas_within_braces_and_the_report_has_a_cell_per_key() {
+    let from = "[\"average-position\", \"proportional-derivative\"]";
+    let to = "[\"average-position\", \"wave{impedance=30, on-loss=hold}\"]";
+    let study = read(from, to).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(study.conditions[3].texts, ["wave{impedance=30,on-loss=hold}", "100ms"]);
+    let scene = study.condition_scene(3).unwrap_or_else(|error| panic!("{error}"));
+    assert!(scene.text.contains("impedance = 30"), "{}", scene.text);
+    let from = "\"link.delay\" = [\"0ms\", \"100ms\"]";
+    let study = read(from, "link = [{ delay = \"0ms\" }, { delay = \"100ms\", loss = \"1%\" }]").unwrap_or_else(|error| panic!("{error}"));
+    let condition = &study.conditions[3];
+    assert!(condition.texts.len() == 2 && condition.label.matches(", ").count() > 1, "{condition:?}");
+}
+
+/// A study file is written by hand: whatever stands in it, the answer is a message.
+#[test]
+fn no_number_and_no_text_makes_a_panic() {
+    for (from, to) in [
+        ("trials = 5", "trials = 99999999999999999999"),
+        ("trials = 5", "trials = nan"),
+        ("trials = 5", "trials = 5\ntrials = 5"),
+        ("participants = 12", "participants = 9223372036854775807"),
+        ("participants = 12", "participants = -2"),
+        ("seed = 1", "seed = -1"),
+        ("group = 2", "group = 0"),
+        ("at-least = \"30s\"", "at-least = \"99999999999999999999h\""),
+        ("every = 10", "every = 0"),
+        ("\"0ms\", \"100ms\"", "nan, inf"),
+        ("\"0ms\", \"100ms\"", ""),
+        ("\"0ms\", \"100ms\"", "[\"0ms\"], {}"),
+        ("\"0ms\", \"100ms\"", "\"\", \"\u{202e}=,]\""),
+        ("\"link.delay\" =", "\"\" ="),
+        ("\"link.delay\" =", "\"=\" ="),
+        ("\"link.delay\" =", "\"link.delay=1ms\" ="),
+        ("\"link.delay\" =", "link.delay ="),
+        ("\"together\"", "\"../../together\""),
+        ("steps = 7", "steps = 4294967296"),
+        ("[analysis]", "[operator]\nnoise = nan\n[analysis]"),
+        ("[analysis]", "[operator]\nnoise = inf\n[analysis]"),
+        ("[analysis]", "[operator]\nmove = \"0s\"\n[analysis]"),
+        ("[study]", "[[study]]"),
+        ("[study]", "[studies]"),
+        ("[analysis]", "[[analysis]]"),
+        ("[[questions]]", "[questions]"),
+        ("\"consent.md\"", "\"\""),
+        ("\"consent.md\"", "\".\""),
+        ("\"pull.toml\"", "\"study.toml\""),
+    ] {
+        let error = read(from, to).expect_err(to);
+        assert!(!error.is_empty(), "{to}");
     }
 }

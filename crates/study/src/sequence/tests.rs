@@ -71,6 +71,12 @@ fn the_experimenter_repeats_the_last_valid_trial_of_the_block_and_no_other() {
     answer(&study, &mut session);
     // The last trial belongs to the block before.
     assert_eq!((trial(&session).position, session.handle(Event::Repeat)), (2, Err(SequenceError::NothingToRepeat)));
+    // An answer about the condition is about all of its trials, so that no trial follows the first answer.
+    while matches!(session.step(), Step::Trial(_)) {
+        end(&mut session, &[]);
+    }
+    session.handle(Event::Answered(Answer { seat: 0, question: 0, values: vec![5] })).unwrap();
+    assert_eq!(session.handle(Event::Repeat), Err(SequenceError::NothingToRepeat));
 }
 
 #[test]

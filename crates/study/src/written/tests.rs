@@ -115,6 +115,14 @@ fn every_change_of_a_file_is_found() {
     );
     change("trials/G01-002/scene.toml", "mass = 0.45", "mass = 0.46", &["G01-002: ", "scene.toml is not the scene of this trial"]);
     change("trials/G01-002/inputs.csv", "0,scene,,,", "0,scene,,,0", &["G01-002: "]);
+    // A trial is made valid, or not valid, in its record or in its session alone.
+    change(
+        "trials/G01-002/trial.json",
+        "\"faults\": []",
+        "\"faults\": [\"hidden-page\"]",
+        &["G01-002: trial.json has another code, or other faults"],
+    );
+    change("trials/G01-002/trial.json", "\"G01-002\"", "\"G01-001\"", &["G01-002: trial.json has another code, or other faults"]);
     change("trials.csv", "P03", "P09", &["trials.csv: line 6"]);
     change("answers.csv", "P04", "P09", &["answers.csv"]);
     fs::remove_file(at.path().join("answers.parquet")).unwrap();
@@ -146,6 +154,22 @@ fn a_forgotten_person_leaves_nothing_and_the_row_is_given_again() {
     fs::create_dir(at.path().join("trials/G01-001")).unwrap();
     let mut folder = StudyFolder::begin_again(at.path());
     assert_eq!(names(&at.path().join("trials")), ["G02-001", "G02-002"]);
+    let session = at.path().join("groups/G01.jsonl");
+    let text = fs::read_to_string(&session).unwrap();
+    assert!(text.contains("\"question\":0"), "{text}");
+    for (from, to) in [
+        ("\"question\":0", "\"question\":9"),
+        ("\"condition\":0", "\"condition\":2"),
+        ("\"values\":[", "\"values\":[5,"),
+        ("\"seat\":0", "\"seat\":2"),
+    ] {
+        fs::write(&session, text.replacen(from, to, 1)).unwrap();
+        drop(folder);
+        let refused = StudyFolder::open_dry(short(), at.path(), PROGRAM).unwrap_err().to_string();
+        assert!(refused.contains("line 2: this answers no question"), "{to}: {refused}");
+        fs::write(&session, &text).unwrap();
+        folder = StudyFolder::begin_again(at.path());
+    }
     folder.forget("P01".parse().unwrap()).unwrap();
     assert!(!column(&at.path().join("answers.csv"), "code").contains(&"P01".to_owned()));
 }
@@ -205,6 +229,55 @@ fn a_trial_counts_once_it_has_its_name_and_an_abandoned_row_is_given_again() {
 }
 
 #[test]
+fn valid_trials_without_practice_are_analysed_and_a_timeout_counts_as_the_limit() {
+    let at = tempfile::tempdir().unwrap();
+    let study = Study { practice: 1, trials: 2, questions: Vec::new(), ..short() };
+    let mut folder = StudyFolder::open_dry(study, at.path(), PROGRAM).unwrap();
+    assert!(folder.play_dry(&NoWatch).unwrap());
+    // Trials 1 and 4 of each session are for practice. The time of each trial is its number.
+    let mut trials = folder.kept_trials().unwrap();
+    for trial in &mut trials {
+        let number = f64::from(u32::try_from(trial.ended.plan.code.number).unwrap());
+        trial.record.values = vec![("task_time_s".to_owned(), Some(number))];
+    }
+    let times = |trials: &[crate::tables::KeptTrial]| folder.analysis_of(trials).measures[0].clone();
+    assert_eq!(times(&trials).rows, [[2.5, 5.5], [2.5, 5.5]]);
+    // A trial that is not valid does not count.
+    trials[2].ended.faults = vec![Fault::LateTicks];
+    assert_eq!(times(&trials).rows, [[2.0, 5.5], [2.5, 5.5]]);
+    // The limit is 20 s.
+    trials[5].record.outcome = "timed-out".to_owned();
+    trials[5].record.values[0].1 = None;
+    let found = times(&trials);
+    assert_eq!((found.rows, found.left_out), (vec![vec![2.0, 12.5], vec![2.5, 5.5]], 0));
+    assert_eq!(found.timed_out.iter().map(|share| share.map(|share| (share.count, share.of))).collect::<Vec<_>>(), [Some((0, 3)), Some((1, 4))]);
+    // A group without any value in a condition is left out as a whole, because differences are within groups.
+    for trial in &mut trials[10..] {
+        trial.record.outcome = "failed".to_owned();
+        trial.record.values[0].1 = None;
+    }
+    let found = times(&trials);
+    assert_eq!((found.rows, found.left_out, found.differences[0].estimate.mean), (vec![vec![2.0, 12.5]], 1, 10.5));
+    assert_eq!(folder.analysis_of(&trials).measures[1].left_out, 2);
+}
+
+/// The session takes a trial only once the trial has its name.
+#[test]
+fn a_trial_that_cannot_be_kept_changes_no_session() {
+    let at = tempfile::tempdir().unwrap();
+    let mut folder = StudyFolder::open(short(), at.path(), PROGRAM).unwrap();
+    let mut session = folder.next_group().unwrap();
+    let before = session.clone();
+    staged(&folder, &session);
+    fs::create_dir_all(at.path().join("trials/G01-001/in-the-way")).unwrap();
+    assert!(matches!(folder.keep_trial(&mut session, TrialFacts::default()), Err(StudyError::File { .. })));
+    assert_eq!((&session, folder.trials(), names(&at.path().join("groups"))), (&before, 0, Vec::new()));
+    fs::remove_dir_all(at.path().join("trials/G01-001")).unwrap();
+    folder.keep_trial(&mut session, TrialFacts::default()).unwrap();
+    assert_eq!((session.ended().len(), folder.trials()), (1, 1));
+}
+
+#[test]
 fn a_damaged_session_is_refused_with_its_line() {
     let at = tempfile::tempdir().unwrap();
     drop(played(at.path()));
@@ -219,11 +292,25 @@ fn a_damaged_session_is_refused_with_its_line() {
         assert!(text.contains(from), "{text}");
         fs::write(&file, text.replacen(from, to, 1)).unwrap();
         let refused = StudyFolder::open_dry(short(), at.path(), PROGRAM).unwrap_err();
-        assert!(matches!(refused, StudyError::Damaged { .. }) && refused.is_io(), "{refused}");
+        assert!(matches!(refused, StudyError::Damaged { .. }), "{refused}");
         let refused = refused.to_string();
         assert!(refused.contains(words) || refused.contains("no answer"), "{from}: {refused}");
     }
-    fs::write(&file, &text).unwrap();
+    // Trials are not removed because the file of their session is lost, or is an older one from a copy.
+    let trials = names(&at.path().join("trials"));
+    let last = at.path().join("groups/G02.jsonl");
+    let of_last = fs::read_to_string(&last).unwrap();
+    for lost in [None, Some(of_last.lines().next().unwrap())] {
+        match lost {
+            None => fs::remove_file(&last).unwrap(),
+            Some(head) => fs::write(&last, head).unwrap(),
+        }
+        fs::write(&file, &text).unwrap();
+        let refused = StudyFolder::open_dry(short(), at.path(), PROGRAM).unwrap_err().to_string();
+        assert!(refused.contains("G02.jsonl") && refused.contains("the trial G02-002 has ended"), "{refused}");
+        assert_eq!(names(&at.path().join("trials")), trials);
+    }
+    fs::write(&last, &of_last).unwrap();
     fs::rename(&file, at.path().join("groups/G03.jsonl")).unwrap();
     assert!(StudyFolder::open_dry(short(), at.path(), PROGRAM).unwrap_err().to_string().contains("G01 is missing"));
 }

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::error::StudyError;
 use crate::folder::StudyFolder;
+use crate::sequence::Fault;
 use crate::tables::KeptTrial;
 use crate::trial::Players;
 
@@ -51,6 +52,11 @@ impl StudyFolder {
         let plan = &trial.ended.plan;
         let folder = self.trial(plan.code);
         let of_trial = |difference: String| format!("{}: {difference}", plan.code);
+        // The experimenter may have repeated a valid trial after its record was kept.
+        let faults: Vec<Fault> =
+            trial.ended.faults.iter().copied().filter(|fault| *fault != Fault::Repeated || trial.record.faults.contains(fault)).collect();
+        let is_as_told = trial.record.trial == plan.code && trial.record.faults == faults;
+        let told = (!is_as_told).then(|| "trial.json has another code, or other faults, than the session".to_owned());
         let replayed = match trial.record.differences(&folder) {
             Ok(differences) => differences,
             // A damaged record or scene is a difference, not a failure of the verification.
@@ -65,7 +71,7 @@ impl StudyFolder {
         let path = folder.join("scene.toml");
         let is_planned = fs::read_to_string(&path).map_err(StudyError::file("read", &path))? == scene.text;
         let other = (!is_planned).then(|| "scene.toml is not the scene of this trial".to_owned());
-        Ok(replayed.into_iter().chain(other).map(of_trial).collect())
+        Ok(replayed.into_iter().chain(other).chain(told).map(of_trial).collect())
     }
 }
 
