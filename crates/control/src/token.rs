@@ -91,7 +91,7 @@ impl fmt::Debug for Token {
 pub struct Guests(Arc<Mutex<Vec<Token>>>);
 
 impl Guests {
-    /// Replaces all tokens. Connections that showed an old token go on, and their next request is refused.
+    /// Replaces all tokens. A request with an old token is refused, and a WebSocket that was opened with an old token ends.
     pub fn set(&self, tokens: Vec<Token>) {
         *self.lock() = tokens;
     }

@@ -9,9 +9,10 @@ function tell(text, bad) {
   $('answer').className = bad ? 'bad' : 'good';
 }
 
-async function command(what) {
+/** `expects` is what the button said: a second press must not do what comes after that. */
+async function command(what, expects) {
   try {
-    show(await ask('/api/study', { method: 'POST', body: JSON.stringify({ do: what }) }));
+    show(await ask('/api/study', { method: 'POST', body: JSON.stringify({ do: what, expects }) }));
     tell('✓ ' + what, false);
   } catch (error) {
     tell('✗ ' + error.message, true);
@@ -93,7 +94,7 @@ async function look() {
   setTimeout(look, EVERY);
 }
 
-$('next').addEventListener('click', () => command('next'));
+$('next').addEventListener('click', () => command('next', $('next').textContent));
 twice($('repeat'), 'repeat', 'Really repeat it?');
 twice($('abandon'), 'abandon', 'Really abandon the group?');
 addEventListener('keydown', (event) => {

@@ -77,7 +77,11 @@ function onNews(news) {
 function showWords(before) {
   const { title, content, buttons = [], read } = PAGES[now.page]();
   // What somebody fills in stays when the same page is told again, such as after a lost connection.
-  if (JSON.stringify({ ...before, left_s: 0 }) === JSON.stringify({ ...now, left_s: 0 })) return;
+  if (JSON.stringify({ ...before, left_s: 0 }) === JSON.stringify({ ...now, left_s: 0 })) {
+    // A button that was pressed before the connection was lost may have had no effect.
+    for (const button of document.querySelectorAll('#buttons button')) button.disabled = false;
+    return;
+  }
   put($('words-title'), title);
   $('words-text').replaceChildren(...content);
   const isAsking = now.page === 'questions';

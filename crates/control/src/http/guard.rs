@@ -134,7 +134,7 @@ impl Visitor {
 }
 
 /// Returns the owner of the token, shown in the header `Authorization` or in the query.
-fn check_token(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<Visitor, Refusal> {
+pub(super) fn check_token(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<Visitor, Refusal> {
     let in_header = headers.get_all(header::AUTHORIZATION).iter().filter_map(|value| bearer(value.as_bytes()));
     let in_query = uri.query().unwrap_or_default().split('&').filter_map(|part| part.strip_prefix("token=")).map(str::as_bytes);
     let owner = |offered: &[u8]| if app.token.is(offered) { Some(Visitor::Host) } else { app.guests.find(offered).map(Visitor::Guest) };

@@ -20,11 +20,11 @@ use tokio_tungstenite::tungstenite::protocol::{Role as End, WebSocketConfig};
 use tokio_tungstenite::tungstenite::{Error, Message};
 
 use super::frames::Counted;
-use super::guard::Visitor;
+use super::guard::{Visitor, check_token};
 use super::places::Seat;
 use super::round_trips::RoundTrips;
 use super::{App, People, Refusal};
-use crate::Hands;
+use crate::{Guests, Hands, Token};
 
 /// Length of the longest accepted message \[byte\]. Three numbers with all digits take 75 bytes.
 const LONGEST: usize = 128;
@@ -60,6 +60,11 @@ pub(super) async fn connect(
         (People::Study(_), Visitor::Host) => Wanted::None,
         (People::Stage(_) | People::Nobody, _) => wanted(request.uri())?,
     };
+    let pass = Pass::of(&app.guests, visitor);
+    // The tokens may have been replaced between the guard and the line above: the pass would be that of another person.
+    if check_token(&app, request.uri(), request.headers())? != visitor {
+        return Err(Refusal::new(StatusCode::CONFLICT, "the tokens of the guests have changed meanwhile: ask again"));
+    }
     let seat = request.extensions().get::<Arc<Seat>>().cloned();
     // The answer is made first, so that a request without a WebSocket takes no hand.
     let answer = create_response_with_body(&request, Body::empty)
@@ -71,7 +76,7 @@ pub(super) async fn connect(
         Wanted::One(hand) => hands.take_hand(Some(hand)).map(Some),
     };
     // The upgrade completes after the answer has been sent, so the conversation waits on a task of its own.
-    tokio::spawn(talk(hands, hand, upgrade, seat));
+    tokio::spawn(talk(hands, hand, pass, upgrade, seat));
     Ok(answer.into_response())
 }
 
@@ -107,6 +112,28 @@ fn wanted(uri: &Uri) -> Result<Wanted, Refusal> {
     }
 }
 
+/// Right of a connection to go on: the token of a guest, as long as the run has not replaced the token. A program in place of a page could otherwise keep the
+/// hand of the next person.
+struct Pass {
+    guests: Guests,
+    /// Token of the guest; `None` for the host, whose token is never replaced.
+    token: Option<Token>,
+}
+
+impl Pass {
+    fn of(guests: &Guests, visitor: Visitor) -> Self {
+        let token = match visitor {
+            Visitor::Host => None,
+            Visitor::Guest(number) => guests.tokens().into_iter().nth(number),
+        };
+        Self { guests: guests.clone(), token }
+    }
+
+    fn is_valid(&self) -> bool {
+        self.token.as_ref().is_none_or(|token| self.guests.find(token.secret().as_bytes()).is_some())
+    }
+}
+
 /// A taken hand. Dropping the value gives the hand back, however the connection ends.
 struct Taken {
     hands: Arc<dyn Hands>,
@@ -134,7 +161,7 @@ fn limits() -> WebSocketConfig {
 }
 
 /// Serves the WebSocket of a page until its end. Holds `seat`, the place of the connection, as long.
-async fn talk(hands: Arc<dyn Hands>, hand: Result<Option<usize>, String>, upgrade: OnUpgrade, seat: Option<Arc<Seat>>) {
+async fn talk(hands: Arc<dyn Hands>, hand: Result<Option<usize>, String>, pass: Pass, upgrade: OnUpgrade, seat: Option<Arc<Seat>>) {
     // A refused hand is told to the page, which may still watch.
     let greeting = match &hand {
         Ok(hand) => json!({ "hand": hand }),
@@ -147,7 +174,7 @@ async fn talk(hands: Arc<dyn Hands>, hand: Result<Option<usize>, String>, upgrad
     let (mut out, incoming) = socket.split();
     if send(&mut out, Message::text(greeting.to_string())).await {
         // Whichever future ends first ends both.
-        select(pin!(listen(&taken, incoming)), pin!(show(&*hands, &taken, out))).await;
+        select(pin!(listen(&taken, incoming)), pin!(show(&*hands, &taken, &pass, out))).await;
     }
     // The hand and the place are free only after the end of both directions.
     drop((taken, seat));
@@ -187,14 +214,17 @@ pub(crate) async fn hear(hands: Arc<dyn Hands>, hand: usize, stream: impl tokio:
     listen(&Some(Taken::new(hands, hand)), incoming).await;
 }
 
-/// Sends each new picture of the motion, and news for the page's hand, until the page accepts no more or answers no pings.
-async fn show(hands: &dyn Hands, taken: &Option<Taken>, mut out: impl Sink<Message> + Unpin) {
+/// Sends each new picture of the motion, and news for the page's hand, until the page accepts no more or answers no pings, or the pass has ended.
+async fn show(hands: &dyn Hands, taken: &Option<Taken>, pass: &Pass, mut out: impl Sink<Message> + Unpin) {
     let mut ticks = interval(EVERY);
     // A slow page gets fewer pictures, not old pictures.
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let (mut shown, mut told, mut last) = (0, 0, Instant::now());
     loop {
         ticks.tick().await;
+        if !pass.is_valid() {
+            return;
+        }
         let now = Instant::now();
         let mut messages = Vec::new();
         if let Some(Taken { hand, trips, .. }) = taken {

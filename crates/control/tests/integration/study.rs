@@ -209,6 +209,18 @@ fn a_person_moves_the_own_hand_hears_news_and_answers_pings() {
     lab.study.wait("trip of 1");
     socket.send(Message::text("sesame")).unwrap();
     lab.study.wait("left 1");
+    // A program that stays connected does not keep the hand of the next person, and the others stay.
+    let mut ends = lab.connect(&lab.person(0), None).unwrap();
+    let mut stays = lab.connect(&lab.person(1), None).unwrap();
+    assert_eq!([text(&mut ends).unwrap(), text(&mut stays).unwrap()], [r#"{"hand":0}"#, r#"{"hand":1}"#]);
+    // A program that reads answers pings, and would stay otherwise.
+    std::thread::spawn(move || while ends.read().is_ok() {});
+    let mut tokens = lab.guests.tokens();
+    tokens[0] = Token::random().unwrap();
+    lab.guests.set(tokens);
+    lab.study.wait("left 0");
+    *lab.study.news.lock().unwrap() = (3, r#"{"page":"ready"}"#.to_owned());
+    while text(&mut stays).unwrap() != r#"{"page":"ready"}"# {}
     // The experimenter has no hand.
     let mut host = lab.connect(TOKEN, None).unwrap();
     assert_eq!(text(&mut host).unwrap(), r#"{"hand":null}"#);
