@@ -1,39 +1,34 @@
-//! The group under way: answers the pages of people and of the experimenter, and keeps answers, trials and the experimenter's decisions.
-//!
-//! Threads of the control server call [`Hands`] and [`StudyPages`]. The main thread waits for trials and runs them.
+//! The group under way: keeps answers, trials and the experimenter's decisions, and gives the main thread its work.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError, TryLockError};
+use std::sync::{Condvar, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant as Clock};
 
-use cohaptic_control::{Guests, Hands, Study as StudyPages, Token};
-use cohaptic_study::{Answer, Event, Sequence, Step, Study, StudyError, StudyFolder, TrialFacts, TrialPlan, TrialScene};
-use serde_json::Value;
+use cohaptic_control::{Guests, Token};
+use cohaptic_study::{Event, Sequence, Step, Study, StudyError, StudyFolder, TrialFacts, TrialPlan, TrialScene};
 
 use super::access::{Access, AccessFile, tokens};
 use super::hands::Hand;
-use super::people::{People, Way, Work};
-use super::{lock, overview};
+use super::lock;
+use super::people::Work;
+use super::state::{State, Wish};
 use crate::failure::Failure;
 use crate::play::{Frames, scene_facts};
 use crate::study::failure;
 
-/// Time between two pings of a browser: a trial of three seconds has thirty.
-const PING: Duration = Duration::from_millis(100);
-
 /// The group under way, with all data shared by the threads.
 pub(super) struct Lab {
     pub(super) study: Study,
-    folder: Mutex<StudyFolder>,
-    state: Mutex<State>,
+    pub(super) folder: Mutex<StudyFolder>,
+    pub(super) state: Mutex<State>,
     /// Signals the main thread that `state` has changed.
-    changed: Condvar,
+    pub(super) changed: Condvar,
     /// Hands of the people, indexed by seat.
     pub(super) hands: Vec<Hand>,
     pub(super) guests: Guests,
     pub(super) frames: Frames,
     /// `true` if the running trial has to end. An atomic, so that the real-time thread asks without a lock.
-    ends_trial: AtomicBool,
+    pub(super) ends_trial: AtomicBool,
     access: AccessFile,
     /// Address of the server without a path, token and port, once the server listens.
     site: OnceLock<Site>,
@@ -45,35 +40,6 @@ pub(super) struct Site {
     pub(super) url: String,
     pub(super) port: u16,
     pub(super) experimenter: Token,
-}
-
-/// State of the group under way.
-pub(super) struct State {
-    pub(super) session: Sequence,
-    pub(super) people: People,
-    /// End of the least time of the break; `None` outside of breaks.
-    pub(super) break_end: Option<Clock>,
-    /// Wish of the experimenter for the running trial.
-    wish: Wish,
-    /// Line about the last trial, for the experimenter, and whether the trial was valid.
-    pub(super) last: Option<(String, bool)>,
-    /// `true` once the addresses of the people are printed.
-    is_announced: bool,
-    /// `true` once the tables of the ended group are written. The next group may begin.
-    pub(super) is_closed: bool,
-    /// `true` if the study needs no more groups.
-    pub(super) is_full: bool,
-    /// `true` if the experimenter has ended the study.
-    is_over: bool,
-    /// Failure that ends the program.
-    failure: Option<Failure>,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Wish {
-    None,
-    Repeat,
-    Abandon,
 }
 
 /// Work for the main thread.
@@ -120,7 +86,7 @@ impl Lab {
     }
 
     /// Gives the people their tokens, and keeps the tokens for a restart.
-    fn admit(&self, state: &mut State, tokens: Vec<Token>) -> Result<(), Failure> {
+    pub(super) fn admit(&self, state: &mut State, tokens: Vec<Token>) -> Result<(), Failure> {
         let site = self.site.get().expect("the server listens");
         let people = tokens.iter().map(|token| token.secret().to_owned()).collect();
         self.guests.set(tokens);
@@ -191,6 +157,8 @@ impl Lab {
         state.people.hands.clone_from(&trial.hands);
         state.people.work = Work::Running;
         state.wish = Wish::None;
+        // Opening the session took a while, in which no page had a trial to speak of.
+        self.hands.iter().for_each(|hand| hand.hear(Clock::now()));
         self.ends_trial.store(false, Ordering::Relaxed);
         self.update(&mut state);
     }
@@ -247,7 +215,7 @@ impl Lab {
     }
 
     /// Keeps an event, and goes on.
-    fn keep(&self, state: &mut State, event: Event) -> Result<(), String> {
+    pub(super) fn keep(&self, state: &mut State, event: Event) -> Result<(), String> {
         let kept = lock(&self.folder).keep(&mut state.session, event);
         match kept {
             Ok(()) => {
@@ -276,17 +244,9 @@ impl Lab {
         self.update(state);
     }
 
-    fn update(&self, state: &mut State) {
+    pub(super) fn update(&self, state: &mut State) {
         state.people.update(&self.study, &state.session);
         self.changed.notify_all();
-    }
-
-    /// Begins the trial if everybody is ready and at the page.
-    fn begin_if_ready(&self, state: &mut State) {
-        if state.is_at_trial() && state.people.all_ready() && self.missing(state).is_empty() {
-            state.people.work = Work::Starting;
-            self.update(state);
-        }
     }
 
     /// Returns the codes of people without a visible page.
@@ -294,241 +254,8 @@ impl Lab {
         let is_away = |hand: &Hand| !hand.is_connected() || hand.is_hidden();
         state.session.people().iter().zip(&self.hands).filter(|(_, hand)| is_away(hand)).map(|(code, _)| code.to_string()).collect()
     }
-
-    /// Carries out the experimenter's `next` at this point.
-    fn next(&self, state: &mut State) -> Result<(), String> {
-        match state.session.step() {
-            Step::Done | Step::Abandoned if !state.is_closed => Err("the tables of the group are being written".to_owned()),
-            Step::Done | Step::Abandoned if state.is_full => {
-                state.is_over = true;
-                self.changed.notify_all();
-                Ok(())
-            }
-            Step::Done | Step::Abandoned => self.begin_group(state),
-            _ if !state.people.has_begun() => Err("not everybody has agreed and read the instructions".to_owned()),
-            Step::Trial(_) if !state.is_at_trial() => Err("a trial is under way".to_owned()),
-            Step::Trial(_) => {
-                let missing = self.missing(state);
-                if !missing.is_empty() {
-                    return Err(format!("{} has no page open, or another page in front of it", missing.join(" and ")));
-                }
-                state.people.work = Work::Starting;
-                self.update(state);
-                Ok(())
-            }
-            Step::Questions { .. } => Err("not everybody has answered".to_owned()),
-            Step::Break { .. } if !state.people.may_end_break => Err("the break is not over".to_owned()),
-            Step::Break { .. } => self.keep(state, Event::BreakOver),
-        }
-    }
-
-    fn begin_group(&self, state: &mut State) -> Result<(), String> {
-        let session = lock(&self.folder).next_group().ok_or("the study needs no more groups")?;
-        *state = State::of(session);
-        let begun = (0..self.hands.len()).map(|_| token()).collect::<Result<_, _>>().and_then(|tokens| self.admit(state, tokens));
-        begun.map_err(|failure| {
-            state.failure = Some(failure);
-            "the study cannot go on".to_owned()
-        })
-    }
 }
 
-fn token() -> Result<Token, Failure> {
+pub(super) fn token() -> Result<Token, Failure> {
     Token::random().map_err(|error| Failure::System(error.to_string()))
-}
-
-impl State {
-    fn of(session: Sequence) -> Self {
-        let people = People::of(&session);
-        let mut state = Self {
-            session,
-            people,
-            break_end: None,
-            wish: Wish::None,
-            last: None,
-            is_announced: false,
-            is_closed: false,
-            is_full: false,
-            is_over: false,
-            failure: None,
-        };
-        // A break that a crash interrupted begins again.
-        if let Step::Break { at_least } = state.session.step() {
-            state.break_end = Some(Clock::now() + at_least);
-        }
-        state
-    }
-
-    /// Returns whether the group waits for the beginning of a trial.
-    pub(super) fn is_at_trial(&self) -> bool {
-        self.people.has_begun() && self.people.work == Work::None && matches!(self.session.step(), Step::Trial(_))
-    }
-
-    /// Returns whether the last trial could be repeated.
-    pub(super) fn may_repeat(&self) -> bool {
-        self.people.work == Work::Running || (self.people.work == Work::None && self.session.clone().handle(Event::Repeat).is_ok())
-    }
-
-    pub(super) fn may_abandon(&self) -> bool {
-        !matches!(self.session.step(), Step::Done | Step::Abandoned) && matches!(self.people.work, Work::None | Work::Running)
-    }
-}
-
-impl Hands for Lab {
-    fn frame(&self) -> (u64, Arc<str>) {
-        self.frames.text()
-    }
-
-    fn take_hand(&self, wanted: Option<usize>) -> Result<usize, String> {
-        let seat = wanted.filter(|seat| *seat < self.hands.len()).ok_or("expected the token of a person")?;
-        if !self.hands[seat].connect() {
-            return Err("another window has this address open".to_owned());
-        }
-        Ok(seat)
-    }
-
-    fn move_hand(&self, hand: usize, position: Option<[f64; 3]>) -> Result<(), String> {
-        self.hands[hand].hear(Clock::now());
-        self.hands[hand].tell(position)
-    }
-
-    fn leave_hand(&self, hand: usize) {
-        self.hands[hand].disconnect();
-        let mut state = lock(&self.state);
-        state.people.set_ready(hand, false);
-        self.free_place(&mut state, hand);
-        self.update(&mut state);
-    }
-
-    fn news(&self, hand: usize, shown: u64) -> Option<(u64, String)> {
-        // The lock is held while an event is written to the disk. The server asks again 16 ms later, and must not wait.
-        let state = match self.state.try_lock() {
-            Ok(state) => state,
-            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
-            Err(TryLockError::WouldBlock) => return None,
-        };
-        let (number, page) = state.people.news(hand, shown)?;
-        let mut page = page.clone();
-        if let Some(end) = state.break_end {
-            page["left_s"] = end.saturating_duration_since(Clock::now()).as_secs_f64().into();
-        }
-        Some((number, page.to_string()))
-    }
-
-    fn hear(&self, hand: usize, word: &str) -> Result<(), String> {
-        self.hands[hand].hear(Clock::now());
-        match word {
-            "here" => Ok(()),
-            "hidden" | "seen" => {
-                self.hands[hand].hide(word == "hidden");
-                self.begin_if_ready(&mut lock(&self.state));
-                Ok(())
-            }
-            _ => Err("expected a position, here, hidden or seen".to_owned()),
-        }
-    }
-
-    fn measures_round_trips(&self) -> Option<Duration> {
-        Some(PING)
-    }
-
-    fn round_trip(&self, hand: usize, took: Duration) {
-        self.hands[hand].round_trip(took);
-    }
-}
-
-impl StudyPages for Lab {
-    fn overview(&self) -> Value {
-        overview::of(self, &lock(&self.state))
-    }
-
-    fn command(&self, wish: &Value) -> Result<(), String> {
-        let mut state = lock(&self.state);
-        match wish["do"].as_str() {
-            Some("next") => self.next(&mut state),
-            Some("repeat") if state.people.work == Work::Running => self.stop_trial(&mut state, Wish::Repeat),
-            Some("abandon") if state.people.work == Work::Running => self.stop_trial(&mut state, Wish::Abandon),
-            Some("repeat" | "abandon") if state.people.work != Work::None => Err("a trial begins or ends: wait a moment".to_owned()),
-            Some("repeat") => {
-                self.keep(&mut state, Event::Repeat)?;
-                if let Some((said, is_valid)) = &mut state.last {
-                    said.push_str(", and not valid any more: it is repeated");
-                    *is_valid = false;
-                }
-                Ok(())
-            }
-            Some("abandon") => self.keep(&mut state, Event::Abandon),
-            _ => Err("expected {\"do\": \"next\"}, or repeat, or abandon".to_owned()),
-        }
-    }
-
-    fn tell(&self, person: usize, said: &Value) -> Result<(), String> {
-        let mut state = lock(&self.state);
-        let step = state.session.step();
-        let has_begun = state.people.has_begun();
-        match (said["do"].as_str(), step) {
-            (Some("ready"), Step::Trial(_)) if state.is_at_trial() => {
-                state.people.set_ready(person, true);
-                self.update(&mut state);
-                self.begin_if_ready(&mut state);
-                Ok(())
-            }
-            (Some("ready"), Step::Break { .. }) if state.people.may_end_break => {
-                state.people.set_ready(person, true);
-                self.update(&mut state);
-                if state.people.all_ready() { self.keep(&mut state, Event::BreakOver) } else { Ok(()) }
-            }
-            (Some("answer"), Step::Questions { .. }) if has_begun => self.answer(&mut state, person, &said["answers"]),
-            (Some(word), _) if !has_begun => {
-                state.people.walk(person, word)?;
-                // The page of a person who refused is shown as long as it is open.
-                if !self.hands[person].is_connected() {
-                    self.free_place(&mut state, person);
-                }
-                self.update(&mut state);
-                Ok(())
-            }
-            _ => Err("the page has changed meanwhile".to_owned()),
-        }
-    }
-}
-
-impl Lab {
-    /// Gives the place of a person who refused another address, for another person.
-    fn free_place(&self, state: &mut State, seat: usize) {
-        if state.people.way(seat) != Way::Refused {
-            return;
-        }
-        let freed = token().and_then(|new| {
-            let mut tokens = self.guests.tokens();
-            tokens[seat] = new;
-            state.people.replace(seat);
-            self.admit(state, tokens)
-        });
-        state.failure = state.failure.take().or_else(|| freed.err());
-    }
-
-    fn stop_trial(&self, state: &mut State, wish: Wish) -> Result<(), String> {
-        state.wish = wish;
-        self.ends_trial.store(true, Ordering::Relaxed);
-        Ok(())
-    }
-
-    /// Keeps the answers of a person: `[{"question": 0, "answer": [50, 5, …]}, …]`.
-    fn answer(&self, state: &mut State, seat: usize, answers: &Value) -> Result<(), String> {
-        let refused = || "expected answers to all questions of the page".to_owned();
-        let number = |value: &Value| value.as_u64().and_then(|number| u32::try_from(number).ok());
-        let read = |answer: &Value| {
-            let question = answer["question"].as_u64().and_then(|index| usize::try_from(index).ok())?;
-            let values = answer["answer"].as_array()?.iter().map(number).collect::<Option<Vec<u32>>>()?;
-            Some(Answer { seat, question, values })
-        };
-        let answers: Vec<Answer> = answers.as_array().ok_or_else(refused)?.iter().map(read).collect::<Option<_>>().ok_or_else(refused)?;
-        // All answers are tried first, so that a refusal keeps none of them.
-        let mut tried = state.session.clone();
-        for answer in &answers {
-            tried.handle(Event::Answered(answer.clone())).map_err(|error| error.to_string())?;
-        }
-        answers.into_iter().try_for_each(|answer| self.keep(state, Event::Answered(answer)))
-    }
 }

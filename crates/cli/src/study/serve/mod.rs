@@ -5,6 +5,8 @@ mod hands;
 mod lab;
 mod overview;
 mod people;
+mod requests;
+mod state;
 mod text;
 mod trial;
 
@@ -20,7 +22,8 @@ use cohaptic_scene::TaskOutcome;
 use cohaptic_study::{Fault, GroupCode, Players, Sequence, Step, StudyFolder, TrialFacts, TrialPlan};
 
 use self::access::{Access, AccessFile};
-use self::lab::{Lab, Site, Task, Wish};
+use self::lab::{Lab, Site, Task};
+use self::state::Wish;
 use self::trial::Ended;
 use crate::arguments::StudyRunArguments;
 use crate::failure::Failure;
@@ -55,8 +58,9 @@ pub(super) fn serve(arguments: &StudyRunArguments, folder: StudyFolder) -> Resul
     let file = AccessFile::of(folder.path());
     let kept = file.read();
     let Some(session) = folder.next_group() else {
-        // A crash may have come between the last session and its tables.
+        // A crash may have come between the last session and its tables, or before the addresses were removed.
         folder.write_tables().map_err(failure)?;
+        file.remove();
         say("the study is complete: no group is needed any more");
         return Ok(ExitCode::SUCCESS);
     };

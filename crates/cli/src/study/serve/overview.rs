@@ -5,8 +5,9 @@ use std::time::Instant as Clock;
 use cohaptic_study::Step;
 use serde_json::{Value, json};
 
-use super::lab::{Lab, State};
+use super::lab::Lab;
 use super::people::Work;
+use super::state::State;
 
 /// Returns the overview as a JSON object.
 pub(super) fn of(lab: &Lab, state: &State) -> Value {
@@ -42,6 +43,11 @@ pub(super) fn of(lab: &Lab, state: &State) -> Value {
         "last_valid": state.last.as_ref().map(|(_, is_valid)| is_valid),
         "people": people,
     })
+}
+
+/// Returns the effect of `next` at this point, as the button says; `None` if `next` is refused now.
+pub(super) fn next_name(lab: &Lab, state: &State) -> Option<&'static str> {
+    place(lab, state).1
 }
 
 /// Returns the place of the group in the study, in words, and the effect of `next`; `None` if `next` is refused now.

@@ -139,6 +139,7 @@ pub(super) fn take_part(control: Control, mut hides: bool) -> JoinHandle<Vec<Val
                         return pages;
                     }
                 } else if said["peers"].is_array() && in_trial {
+                    assert_eq!(said["packets"], json!([]), "packets tell the delay");
                     if hides {
                         page.say("hidden");
                         page.say("seen");
@@ -211,6 +212,7 @@ fn a_group_goes_through_a_study_with_a_refusal_a_hidden_page_and_a_crash() {
         assert!(pages.iter().all(|pages| names(pages).contains(&asked)), "{asked}: {pages:?}");
     }
     // The other copy and packets are not shown, and no page tells the condition.
+    assert!(pages.iter().flatten().filter(|page| page["page"] == "trial").all(|page| page["facts"]["alone"] == true), "{pages:?}");
     assert!(pages.iter().flatten().all(|page| !page.to_string().contains("20ms")));
     let study = wait_for("the end of the group", || Some(host.get("/api/study")).filter(|study| study["next"] == "End the study"));
     assert_eq!(study["may"], json!({ "next": true, "repeat": false, "abandon": false }), "{study}");
@@ -224,6 +226,24 @@ fn a_group_goes_through_a_study_with_a_refusal_a_hidden_page_and_a_crash() {
     let csv = desk.read("data/trials.csv");
     assert!(csv.lines().count() >= 4, "a head, the hidden trial, the repetition, and the other condition: {csv}");
     desk.text("study verify data");
+    // A process killed after the last answer leaves the addresses. The next one has nothing to serve, and removes them.
+    desk.write("data/access.json", "{}");
+    assert_eq!(desk.cohaptic(&format!("study {COMMAND}")).status, Some(0));
+    assert!(!desk.path("data/access.json").exists());
+}
+
+/// No tick of a computer is on time to the nanosecond: each trial is repeated once, and not again.
+#[test]
+fn a_trial_with_late_ticks_is_not_valid_and_is_repeated_once() {
+    let desk = desk();
+    let mut session = Session::study(&desk, &COMMAND.replace("10s", "1ns"));
+    let people = ["P01: ", "P02: "].map(|code| take_part(person_at(&session.told(code)), false));
+    people.into_iter().for_each(|person| drop(person.join().unwrap()));
+    let kept = records(&desk);
+    assert_eq!(kept.len(), 4, "{kept:?}");
+    assert!(kept.iter().all(|record| record["faults"].as_array().unwrap().contains(&json!("late-ticks"))), "{kept:?}");
+    session.interrupt();
+    assert_eq!(session.outcome().status, Some(130));
 }
 
 /// The experimenter repeats a running trial, and abandons the group. The same row is given again, to people with new addresses.
@@ -253,6 +273,9 @@ fn the_experimenter_repeats_abandons_and_begins_the_next_group() {
     });
     let study = place("Trial 2 of 3, a repetition: waits for P01 and P02");
     assert_eq!(study["last_valid"], false, "{study}");
+    // A second press of the button that ended a break must not begin a trial.
+    let (status, said) = host.ask("POST", "/api/study", r#"{"do": "next", "expects": "End the break"}"#);
+    assert!(status == 422 && said.contains("gone on meanwhile"), "{status} {said}");
     if is_repeated {
         with_fault(&desk, "repeated");
         assert!(study["last"].as_str().unwrap().contains("it is repeated"), "{study}");
