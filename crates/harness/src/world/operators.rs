@@ -65,6 +65,8 @@ impl<const A: usize> Operators<A> {
             return;
         }
         let Self { persons, axes, .. } = self;
+        // A target that depends on the time alone is the same for all persons, and its sines take as long as the rest of a tick.
+        let (is_common, mut common) = (!judge.target_follows_copies(), None);
         for Person { peer, operator, arm, sees, noise, draws } in persons {
             let member = &mut members[*peer];
             if ticking.binary_search(peer).is_err() {
@@ -73,7 +75,9 @@ impl<const A: usize> Operators<A> {
             let seen = member.peer.seen(*sees).expect("a scene in which a person sees what the peer does not hear is refused");
             // In a session a pointer may hold the device in place of the person.
             let DeviceModel::Simulated(device) = member.peer.device_mut() else { continue };
-            let (target, radius) = judge.asks(*peer, now, *noise);
+            let asked = common.filter(|_| is_common).unwrap_or_else(|| judge.asks(*peer, now, *noise));
+            common = Some(asked);
+            let (target, radius) = asked;
             let view = View { position: seen, target: core::array::from_fn(|axis| target.get(axis).copied().unwrap_or(0.0)), radius };
             let wanted = operator.tick(&view, |movement| normals(*draws, movement, *axes));
             device.want(arm, &wanted);
