@@ -75,9 +75,11 @@ impl StudyFolder {
     pub(crate) fn analysis_of(&self, trials: &[KeptTrial]) -> Analysis {
         let study = self.study();
         let units: Vec<usize> = self.groups().iter().enumerate().filter(|(_, group)| group.is_done()).map(|(place, _)| place).collect();
+        // A repeated trial carries the fault `Repeated` or another one, so only the repetition passes and no trial counts twice.
         let counts = |trial: &&KeptTrial| !trial.ended.plan.practice && trial.ended.faults.is_empty();
         let observation = |trial: &KeptTrial| {
             Some(Observation {
+                // The list of units is ascending, because the groups are filtered in their order. Trials of incomplete sessions find no unit.
                 unit: units.binary_search(&trial.group).ok()?,
                 condition: trial.ended.plan.condition,
                 trial: trial.ended.plan.trial,
@@ -110,6 +112,7 @@ pub(crate) const TIMED_OUT: &str = "timed-out";
 
 fn measure(study: &Study, units: usize, observations: &[Observation], place: usize, name: &str) -> Analysed {
     let value_of = |observation: &Observation| {
+        // A timed-out task has no time. Leaving such trials out would favour the condition in which people fail most often.
         let counts_as = (name == TIME && observation.timed_out).then_some(study.limit.as_secs_f64());
         observation.values[place].or(counts_as)
     };
@@ -117,20 +120,24 @@ fn measure(study: &Study, units: usize, observations: &[Observation], place: usi
         observations.iter().filter(|observation| observation.condition == condition && wanted(observation)).filter_map(value_of).collect()
     };
     let value = |unit: usize, condition: usize| {
+        // Trials of a unit are averaged first: the trials are not independent, and a unit with more valid trials must not weigh more.
         let values = of(condition, &|observation| observation.unit == unit);
         (!values.is_empty()).then(|| mean(&values))
     };
     let conditions = 0..study.conditions.len();
     let timed_out = conditions.clone().map(|condition| {
+        // Both counts leave out trials without a value, so that the share describes the same trials as the mean.
         let timed_out = of(condition, &|observation| observation.timed_out).len() as u64;
         Share::of(timed_out, of(condition, &|_| true).len() as u64)
     });
+    // A repetition has the number of the repeated trial and fills its place on the curve.
     let curve = |condition: usize| (1..=study.trials).map(|trial| mean(&of(condition, &|observation| observation.trial == trial))).collect();
     Analysed { timed_out: timed_out.collect(), curves: conditions.map(curve).collect(), ..analysed(study, name.to_owned(), units, value) }
 }
 
 /// Returns the figures of values by unit and condition.
 fn analysed(study: &Study, name: String, units: usize, value: impl Fn(usize, usize) -> Option<f64>) -> Analysed {
+    // A unit without a value in one condition is left out of all conditions: intervals and differences need complete rows.
     let row = |unit: usize| (0..study.conditions.len()).map(|condition| value(unit, condition)).collect::<Option<Vec<f64>>>();
     let rows: Vec<Vec<f64>> = (0..units).filter_map(row).collect();
     let (means, differences) = (condition_means(&rows), differences_to_first(&rows, study.seed));

@@ -52,6 +52,7 @@ pub(crate) fn williams(count: usize) -> Vec<Vec<usize>> {
 /// Returns the indices 0 … `count` − 1 in the order of a slot, by exchanges of Fisher & Yates with draws of their own for each slot.
 fn shuffled(seed: u64, slot: usize, count: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..count).collect();
+    // The slot is the address of the draws, so the group that takes the slot of an abandoned session gets the same order.
     let mut words = Stream::new(seed, b"study order").packet(slot as u64).draws(Purpose::Study);
     for last in (1..count).rev() {
         // The upper half of a product with the number of choices. Its bias is below 2⁻⁵⁰ for a thousand conditions.

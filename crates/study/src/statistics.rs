@@ -39,7 +39,9 @@ pub fn condition_means(rows: &[Vec<f64>]) -> Vec<ConditionMean> {
         } else {
             (rows.iter().map(|row| row[condition]).collect(), 1.0)
         };
+        // The mean is taken of the measured values: normalised values have the same mean, but with the rounding of two more sums.
         let values: Vec<f64> = rows.iter().map(|row| row[condition]).collect();
+        // Normalising also removes a part of the variance within the units, by the factor (C−1)/C. The correction of Morey restores this part.
         let half_width = Estimate::of(&normalised).and_then(|estimate| estimate.half_width).map(|half| half * factor);
         ConditionMean { mean: Estimate::of(&values).map_or(f64::NAN, |estimate| estimate.mean), half_width }
     };
@@ -64,12 +66,14 @@ pub struct Difference {
 pub fn differences_to_first(rows: &[Vec<f64>], seed: u64) -> Vec<Difference> {
     let conditions = rows.first().map_or(0, Vec::len);
     let of = |condition: usize| {
+        // Differences are taken within each unit, so that slow and fast groups do not widen the interval.
         let differences: Vec<f64> = rows.iter().map(|row| row[condition] - row[0]).collect();
         let estimate = Estimate::of(&differences)?;
         let p = sign_flip(&differences, seed);
         Some(Difference { estimate, effect: effect(&differences), p, p_holm: p })
     };
     let mut all: Vec<Difference> = (1..conditions).filter_map(of).collect();
+    // Holm's correction depends on all p of the measure, so every difference is made with its plain p first.
     let corrected = holm(&all.iter().map(|difference| difference.p).collect::<Vec<f64>>());
     for (difference, p) in all.iter_mut().zip(corrected) {
         difference.p_holm = p;
@@ -83,6 +87,7 @@ pub fn differences_to_first(rows: &[Vec<f64>], seed: u64) -> Vec<Difference> {
 pub fn effect(differences: &[f64]) -> Option<f64> {
     let n = float(differences.len());
     let mean = differences.iter().sum::<f64>() / n;
+    // Fewer than two values make NaN, in the mean or in the variance, and are refused below by their number.
     let variance = differences.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / (n - 1.0);
     let deviation = libm::sqrt(variance);
     // Equal values can have a mean that is rounded, and then a deviation from the mean of about 1e-16 of their size. An effect of 1e16 would be no finding.
@@ -102,12 +107,14 @@ pub fn sign_flip(differences: &[f64], seed: u64) -> f64 {
         sum.abs() >= observed - tolerance
     };
     if differences.len() <= MOST_EXACT {
+        // Bit k of a number says whether difference k is flipped. Number 0 is the observed choice, so p is always above zero.
         let all = 1_u64 << differences.len();
         let extreme = (0..all).filter(|signs| counts(&|place| signs >> place & 1 == 1)).count();
         return float(extreme) / float(usize::try_from(all).unwrap_or(usize::MAX));
     }
     let stream = Stream::new(seed, b"study flips");
     let extreme = (0..DRAWN).filter(|number| {
+        // Each choice has draws under its own number, so that p does not depend on the order in which the choices are counted.
         let mut draws = stream.packet(*number).draws(Purpose::Study);
         let words: Vec<u64> = core::iter::repeat_with(|| draws.next_word()).take(differences.len().div_ceil(64)).collect();
         counts(&|place| words[place / 64] >> (place % 64) & 1 == 1)
@@ -120,6 +127,7 @@ pub fn sign_flip(differences: &[f64], seed: u64) -> f64 {
 #[must_use]
 pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
+    // Holm's procedure goes from the smallest p to the largest: the factor of a p is the number of tests not yet passed.
     order.sort_by(|one, other| p[*one].total_cmp(&p[*other]));
     let (mut corrected, mut largest) = (vec![1.0; p.len()], 0.0_f64);
     for (rank, place) in order.into_iter().enumerate() {

@@ -173,6 +173,7 @@ impl Sequence {
             ended: Vec::new(),
             rested_at: 0,
             answers: Vec::new(),
+            // Every block has a trial, because a study has at least one analysed trial per condition: the state fits the filled block.
             state: State::Trial,
             events: Vec::new(),
         };
@@ -217,6 +218,7 @@ impl Sequence {
             Event::Answered(answer) => self.answer(answer)?,
             Event::BreakOver => {
                 self.expect_state(State::Break)?;
+                // The break is noted first: otherwise `advance` would find the same break due again.
                 self.rested_at = self.ended.len();
                 self.advance();
             }
@@ -228,6 +230,7 @@ impl Sequence {
                 self.state = State::Abandoned;
             }
         }
+        // Refused events have returned above: a kept session would fail at such an event when it is restored.
         self.events.push(event);
         Ok(())
     }
@@ -272,7 +275,9 @@ impl Sequence {
         let Planned { trial, practice, repeats } = next;
         let number = self.ended.len() + 1;
         let blocks_left = self.order.len() - self.block - 1;
+        // Repetitions in later blocks are not known yet, so the total can grow from trial to trial.
         let of = self.ended.len() + self.left.len() + blocks_left * (self.rules.practice + self.rules.trials);
+        // The seed follows from the code, and a repetition has its own code: the random losses of the repeated trial do not come back.
         let code = TrialCode { group: self.group, number };
         let condition = self.order[self.block];
         TrialPlan { code, position: self.block + 1, condition, trial, practice, repeats, seed: trial_seed(self.rules.seed, code), of }
@@ -289,11 +294,14 @@ impl Sequence {
     fn end_trial(&mut self, faults: &[Fault]) -> Result<(), SequenceError> {
         self.expect_state(State::Trial)?;
         let Some(next) = self.left.front().copied() else { return Err(SequenceError::Ended) };
+        // The plan is made before the trial leaves the block, because `plan` counts the trial as still to run.
         let plan = self.plan(next);
         let mut faults = faults.to_vec();
+        // Sorted as in the record of the trial, with which the verification compares these faults.
         faults.sort_unstable();
         faults.dedup();
         self.left.pop_front();
+        // A repetition with a fault is not repeated again, so a block has at most twice its analysed trials, besides practice.
         if !faults.is_empty() && !plan.practice && plan.repeats.is_none() {
             self.left.push_back(Planned { repeats: Some(plan.code.number), ..next });
         }
@@ -309,6 +317,7 @@ impl Sequence {
     fn answer(&mut self, answer: &Answer) -> Result<(), SequenceError> {
         let State::Questions(after) = self.state else { return Err(SequenceError::Other { waits_for: self.waits_for() }) };
         let question = self.rules.questions.get(answer.question).filter(|question| question.after == after);
+        // The seat is checked, because an answer can come from a damaged file: `due` has questions for any seat, also for a seat of nobody.
         let Some(question) = question.filter(|_| answer.seat < self.rules.people) else { return Err(SequenceError::NotAsked) };
         if !self.due(after, answer.seat).contains(&answer.question) {
             return Err(SequenceError::Answered);
@@ -344,9 +353,11 @@ impl Sequence {
         };
         let last = self.ended.last_mut().filter(may_repeat);
         let Some(last) = last else { return Err(SequenceError::NothingToRepeat) };
+        // `Repeated` enters an empty list, as `may_repeat` has checked, so the faults stay sorted.
         last.faults.push(Fault::Repeated);
         let TrialPlan { trial, practice, code, .. } = last.plan;
         self.left.push_back(Planned { trial, practice, repeats: Some(code.number) });
+        // Only this state treats the block as finished. In the other states the session finds the new trial in `left`.
         if self.state == State::Questions(After::Condition) {
             self.advance();
         }
@@ -356,6 +367,7 @@ impl Sequence {
     /// Goes on after a trial, its questions and a break: to a break, to the next trial of the block, or to the end of the block.
     fn advance(&mut self) {
         let is_due = |breaks: Breaks| !self.ended.is_empty() && self.rested_at != self.ended.len() && self.ended.len().is_multiple_of(breaks.every);
+        // The end of a block comes before a break: `begin_block` calls `advance` again, and a break that is due follows the questions.
         if self.left.is_empty() {
             if self.asks(After::Condition) {
                 self.state = State::Questions(After::Condition);
@@ -372,6 +384,7 @@ impl Sequence {
     /// Begins the next block, or the end of the session after the last block.
     fn begin_block(&mut self) {
         self.block += 1;
+        // The new block is filled before `advance`, which takes an empty block for a finished one.
         self.fill_block();
         if self.block < self.order.len() {
             self.advance();
@@ -423,6 +436,7 @@ impl Sequence {
 
 /// Returns the seed of a trial. 53 bits, so that every reader of the table reads the same number.
 fn trial_seed(seed: u64, code: TrialCode) -> u64 {
+    // Group and number have 32 bits each, so no two trials of a study draw their seeds at the same address.
     let number = (code.group.index() as u64) << 32 | code.number as u64;
     Stream::new(seed, b"study trial").packet(number).first(Purpose::Study) >> 11
 }
