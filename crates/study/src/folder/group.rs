@@ -97,6 +97,7 @@ impl Group {
             GroupState::Forgotten { persons, .. } => persons.clone(),
             GroupState::Session(_) => Vec::new(),
         };
+        // The whole file is written for each event: an appended line could be cut by a crash, and a file written as a whole is old or new.
         let mut text = line(&Head { group: self.code, slot: self.slot, forgotten });
         match &self.state {
             GroupState::Session(session) => text.extend(session.events().iter().map(line)),
@@ -110,11 +111,13 @@ impl Group {
         let refused = |message: String| StudyError::damaged(path, message);
         let mut lines = text.lines();
         let head: Head = parse(1, lines.next().unwrap_or_default()).map_err(refused)?;
+        // A renamed file would give a group the trials of another one, and a slot above the last would fill no row of the study.
         if head.group != code || head.slot >= study.groups {
             return Err(refused(format!("line 1 is of group {}, slot {}", head.group, head.slot)));
         }
         let state = if head.forgotten.is_empty() {
             let events: Vec<Event> = (2..).zip(lines).map(|(number, line)| parse(number, line)).collect::<Result<_, String>>().map_err(refused)?;
+            // The events are played again and so checked one by one: a line that does not fit its place is a damage, not a state.
             let session = Sequence::restored(study, code, head.slot, events).map_err(|error| refused(error.to_string()))?;
             GroupState::Session(Box::new(session))
         } else {

@@ -47,6 +47,7 @@ impl KeptStudy {
     /// Reads the study from the texts.
     pub(super) fn study(&self) -> Result<Study, StudyError> {
         let read = |path: &Path| -> io::Result<Vec<u8>> {
+            // The kept path of the study file has no folder, so paths of named files arrive as written, as in the keys of `files`.
             let text = path.to_str().and_then(|name| self.files.get(name));
             text.map(|text| text.as_bytes().to_vec()).ok_or_else(|| io::Error::from(io::ErrorKind::NotFound))
         };

@@ -79,6 +79,7 @@ impl StudyFolder {
         let is_begun = Self::is_begun(path)?;
         let kept = KeptStudy::of(&study, is_dry);
         let file = path.join(STUDY);
+        // A continued study must be the same: a changed file would mix trials of two designs under the same codes.
         if is_begun {
             let differences = KeptStudy::read(&file)?.differences(&kept);
             if !differences.is_empty() {
@@ -97,6 +98,7 @@ impl StudyFolder {
     /// [`StudyError::NoStudy`] for a folder without a study; otherwise as [`StudyFolder::open`].
     pub fn of_folder(path: &Path, program: &str) -> Result<Self, StudyError> {
         let file = path.join(STUDY);
+        // The file is looked for before the lock is taken, because taking the lock makes missing folders.
         if !file.exists() {
             return Err(StudyError::NoStudy { path: path.to_path_buf() });
         }
@@ -125,6 +127,7 @@ impl StudyFolder {
                 others.push(name);
             }
         }
+        // Names are sorted, because a file system lists files in any order and the message shall always name the same file.
         others.sort();
         match others.into_iter().next() {
             Some(found) => Err(StudyError::Foreign { path: path.to_path_buf(), found }),
@@ -146,8 +149,10 @@ impl StudyFolder {
             fs::create_dir_all(path).map_err(StudyError::file("make the folder", path))?;
         }
         let mut codes: Vec<GroupCode> = names(&folder)?.iter().filter_map(|name| name.strip_suffix(".jsonl")?.parse().ok()).collect();
+        // Codes are sorted as numbers: by name, G100 would come before G11.
         codes.sort_unstable();
         for (index, code) in codes.into_iter().enumerate() {
+            // A gap is refused, because sessions are indexed by their codes and every later session would take a wrong place.
             if code.index() != index {
                 return Err(StudyError::damaged(&folder, format!("{} is missing", GroupCode::of_index(index))));
             }
@@ -156,6 +161,7 @@ impl StudyFolder {
                 && let Step::Trial(plan) = session.step()
                 && self.trial(plan.code).exists()
             {
+                // At most one trial lacks its event, because a session is written before its next trial begins. The record has the same faults.
                 let faults = TrialRecord::read(&self.trial(plan.code))?.faults;
                 session.handle(Event::TrialEnded { faults })?;
                 group.write(&self.group_file(code))?;
@@ -166,6 +172,7 @@ impl StudyFolder {
         if let Some(group) = self.begun_by_its_trial()? {
             self.groups.push(group);
         }
+        // Events are restored before the sweep, which would take a trial without its event for a sign of a damaged session.
         self.sweep()?;
         Ok(self)
     }
@@ -177,6 +184,7 @@ impl StudyFolder {
         if !self.trial(plan.code).exists() {
             return Ok(None);
         }
+        // The slot is the same as before the crash: no other session was kept in between, and the lowest free slot is taken.
         session.handle(Event::TrialEnded { faults: TrialRecord::read(&self.trial(plan.code))?.faults })?;
         let group = Group::of(session);
         group.write(&self.group_file(group.code))?;
@@ -191,6 +199,7 @@ impl StudyFolder {
             let Ok(code) = name.parse::<TrialCode>() else { continue };
             let path = folder.join(name);
             match self.groups.get(code.group.index()) {
+                // Trials are numbered from 1 without gaps, so a session with n ended trials knows exactly the numbers up to n.
                 Some(group) if group.ended().len() >= code.number => {}
                 Some(group) if group.is_forgotten() => fs::remove_dir_all(&path).map_err(StudyError::file("remove", &path))?,
                 Some(_) | None => {
@@ -245,6 +254,7 @@ impl StudyFolder {
 
     /// Returns the lowest slot without a session that is complete or under way.
     fn free_slot(&self) -> Option<usize> {
+        // Abandoned and forgotten sessions leave their slot free: another group must play the row, or the order loses its balance.
         (0..self.study.groups).find(|slot| !self.groups.iter().any(|group| group.slot == *slot && (group.is_done() || group.running().is_some())))
     }
 
@@ -270,6 +280,7 @@ impl StudyFolder {
     /// [`StudyError::File`] if the folder cannot be made.
     pub fn staging(&self) -> Result<PathBuf, StudyError> {
         let path = self.path.join(STAGING);
+        // Files of an interrupted trial must not be kept together with those of the next trial.
         match fs::remove_dir_all(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(StudyError::file("remove", &path)(error)),
             _ => {}
@@ -290,15 +301,18 @@ impl StudyFolder {
             next.handle(Event::TrialEnded { faults: Vec::new() })?;
             return Err(StudyError::Refused(SequenceError::Ended));
         };
+        // The event is tried on a copy before any file is touched: a refused trial leaves session and folder unchanged.
         next.handle(Event::TrialEnded { faults: facts.faults.clone() })?;
         let staging = self.path.join(STAGING);
         let record = TrialRecord::of(plan.code, &staging, facts)?;
         record.write(&staging)?;
+        // The caller wrote these two files, perhaps without a sync. All bytes must be stored before the rename, after which the trial counts.
         for name in ["scene.toml", "inputs.csv"] {
             let file = staging.join(name);
             File::open(&file).and_then(|file| file.sync_all()).map_err(StudyError::file("write", &file))?;
         }
         let path = self.trial(plan.code);
+        // The trial gets its name before the session its event: after a crash between the two, `with_groups` adds the event.
         fs::rename(&staging, &path).map_err(StudyError::file("write", &path))?;
         sync_folder(&self.path.join(TRIALS));
         self.put(session, next)?;
@@ -325,6 +339,7 @@ impl StudyFolder {
 
     fn put_group(&mut self, group: Group) -> Result<(), StudyError> {
         group.write(&self.group_file(group.code))?;
+        // Codes are given in order, so a session that is not in the list is the next one and belongs at the end.
         let index = group.code.index();
         if index < self.groups.len() {
             self.groups[index] = group;

@@ -94,8 +94,10 @@ impl TrialRecord {
             }
         };
         compare("outcome", self.outcome.clone(), outcome);
+        // Numbers are compared as their shortest texts, which differ whenever two finite numbers differ, and serve the message too.
         compare("time_s", format!("{:?}", self.time_s), format!("{time_s:?}"));
         let text = |value: &Option<f64>| value.map_or_else(|| "nothing".to_owned(), |value| format!("{value:?}"));
+        // The longer list sets the end, so that a missing measure and an additional one are both found.
         for place in 0..self.values.len().max(values.len()) {
             let name = |values: &[(String, Option<f64>)]| values.get(place).map(|(name, _)| name.clone());
             let value = |values: &[(String, Option<f64>)]| values.get(place).map_or_else(|| "not there".to_owned(), |(_, value)| text(value));
@@ -127,6 +129,7 @@ impl Replayed {
         let content = scene_content_of_text(&text, &scene_file, &[])?;
         let recorded = RecordedScene::read(&rows).map_err(|error| refused(error.to_string()))?;
         let recorded = recorded.ok_or_else(|| refused("it does not say of which scene it is".to_owned()))?;
+        // Inputs of another scene would be replayed without any complaint and give wrong measures.
         if let Some(difference) = recorded.differences(&RecordedScene::of(&scene, content)).first() {
             return Err(refused(difference.to_string()));
         }

@@ -19,11 +19,13 @@ impl StudyFolder {
             return Err(StudyError::Nobody { path: self.path().to_path_buf(), person });
         };
         let answers = group.answers().iter().filter(|answer| answer.seat != seat).cloned().collect();
+        // A second person of the same group may be forgotten later, and the earlier codes must stay in the file.
         let mut persons = match &group.state {
             GroupState::Forgotten { persons, .. } => persons.clone(),
             GroupState::Session(_) => Vec::new(),
         };
         persons.push(person);
+        // The call may be a repetition after a crash: the person is then in the list already.
         persons.sort_unstable();
         persons.dedup();
         let group = Group { code, slot: group.slot, state: GroupState::Forgotten { persons, answers } };

@@ -26,6 +26,7 @@ impl StudyFolder {
     ///
     /// [`StudyError::File`] if a file cannot be read or written, [`StudyError::Damaged`] for a damaged record of a trial.
     pub fn write_tables(&self) -> Result<(), StudyError> {
+        // The records are read once and before the first write, so a damaged record leaves all tables as they were.
         let trials = self.kept_trials()?;
         let whole = |name: &str, bytes: &[u8]| {
             let path = self.path().join(name);
