@@ -38,6 +38,7 @@ impl StudyFolder {
             page = page.with(Html::warning(warning));
         }
         page = page.with(Html::paragraph(self.sessions(trials))).with(Html::heading(2, "Conditions")).with(conditions(study));
+        // Without a complete session every section would only say that no group has a value.
         if analysis.units > 0 {
             page = page.with(Html::heading(2, "Measures"));
             page = analysis.measures.iter().fold(page, |page, measure| page.with(section(study, measure)));
@@ -54,6 +55,7 @@ impl StudyFolder {
     fn sessions(&self, trials: &[KeptTrial]) -> String {
         let study = self.study();
         let (complete, size) = (self.complete(), study.group_size());
+        // All kept trials are counted, also those of sessions that are not complete: the analysis counts fewer.
         let valid = trials.iter().filter(|trial| trial.ended.faults.is_empty()).count();
         let not_done = self.groups().len() - complete;
         let more = if not_done > 0 { format!(" {} not complete, and not analysed.", Counted(not_done, "session")) } else { String::new() };
@@ -95,6 +97,7 @@ impl Analysis {
         let mut warnings = Vec::new();
         let (units, differences) = (self.units, study.conditions.len().saturating_sub(1));
         if units > 0 && differences > 0 {
+            // Holm multiplies the smallest p by the number of differences, so no corrected p is below this product.
             let least = least_p(units);
             #[expect(clippy::cast_precision_loss, reason = "few conditions")]
             let corrected = least * differences as f64;
@@ -112,6 +115,7 @@ impl Analysis {
                 ));
             }
         }
+        // An unequal use of the rows mixes the effect of the order into the differences between conditions.
         let rows = study.order_rows();
         if study.order == Order::Williams && !study.groups.is_multiple_of(rows) {
             warnings.push(format!(
@@ -125,6 +129,7 @@ impl Analysis {
 
 /// Returns the least p of a sign flip test of so many differences.
 fn least_p(units: usize) -> f64 {
+    // The observed signs and their mirror image are two of 2ⁿ choices. Drawn flips end at 10⁻⁶, which no warning depends on.
     libm::exp2(1.0 - f64::from(u32::try_from(units).unwrap_or(u32::MAX)))
 }
 
@@ -157,6 +162,7 @@ fn section(study: &Study, measure: &Analysed) -> Html {
 
 /// Returns the description of a measure; `None` for a question.
 fn about(name: &str) -> Option<String> {
+    // The last dot separates the name of the peer from the measure, because names of measures have no dot.
     let of_peer = name.strip_prefix("peers.").and_then(|rest| rest.rsplit_once('.')).map(|(_, name)| name);
     let is_it = |measure: &&Measure| measure.name() == of_peer.unwrap_or(name) && (measure.scope() == Scope::Peer) == of_peer.is_some();
     Measure::ALL.iter().find(is_it).map(|measure| format!("{}.", measure.about()))
@@ -194,6 +200,7 @@ pub(crate) fn with_interval(mean: f64, half_width: Option<f64>) -> String {
 
 /// Returns a number with four significant digits.
 pub(crate) fn short(number: f64) -> String {
+    // The text rounds in decimal. Division and multiplication by a power of ten would add errors of their own.
     let rounded: f64 = format!("{number:.3e}").parse().unwrap_or(number);
     SixDigits(rounded).to_string()
 }
@@ -210,6 +217,7 @@ fn picture(study: &Study, measure: &Analysed) -> Picture {
     let mut rows = Panel::new(Axis::new(measure.name.as_str()), Axis::new("").categories(names)).titled("Means and their intervals");
     for (condition, mean) in measure.means.iter().enumerate() {
         let y = place(count - 1 - condition);
+        // A single group has no interval, and equal values have an interval of width zero: the mark stands alone then.
         if let Some(half) = mean.half_width.filter(|half| *half > 0.0) {
             let (low, high) = (mean.mean - half, mean.mean + half);
             let bar = vec![(low, y - HALF_BAR), (high, y - HALF_BAR), (high, y + HALF_BAR), (low, y + HALF_BAR)];
@@ -218,6 +226,7 @@ fn picture(study: &Study, measure: &Analysed) -> Picture {
         rows = rows.with(Line::new([(mean.mean, y)], Look::of(condition)).marks_only(Marker::of(condition)));
     }
     let picture = Picture::new("").aspect(0.5).panel(rows);
+    // A curve of one trial would repeat the means, and a question has no trials.
     if measure.curves.is_empty() || study.trials < 2 {
         return picture;
     }

@@ -63,6 +63,7 @@ impl StudyFolder {
         columns.extend([("valid", Kind::Integer), ("faults", Kind::Text), ("seed", Kind::Integer)].map(|(name, kind)| required(name, kind)));
         columns.extend([("outcome", Kind::Text), ("time_s", Kind::Number), ("late_ticks", Kind::Integer)].map(|(name, kind)| required(name, kind)));
         columns.extend(["round_trip_p50_s", "round_trip_p99_s"].map(|name| optional(name, Kind::Number)));
+        // A measure can lack a value, for example the time of a task that timed out.
         columns.extend(study.measures.iter().map(|name| optional(name, Kind::Number)));
         let rows = trials.iter().flat_map(|trial| {
             let group = &self.groups()[trial.group];
@@ -76,6 +77,7 @@ impl StudyFolder {
         let study = self.study();
         let column = |name: &str, kind: Kind, optional: bool| Column { name: name.to_owned(), kind, optional };
         let mut columns: Vec<Column> = ["group", "session", "code", "hand", "after"].map(|name| column(name, Kind::Text, false)).into();
+        // An answer about the study has no condition, so these columns and the factors may be empty, unlike in the table of trials.
         columns.extend(["position", "condition", "number"].map(|name| column(name, Kind::Integer, true)));
         columns.extend(study.factors.iter().map(|factor| column(&factor.column, factor.kind, true)));
         columns.extend([column("question", Kind::Text, false), column("scale", Kind::Text, false), column("value", Kind::Number, false)]);
@@ -90,9 +92,12 @@ fn trial_row(study: &Study, group: &Group, trial: &KeptTrial, seat: usize) -> Ro
     row.extend([study.row_of(group.slot) + 1, plan.code.number, plan.position, plan.condition + 1].map(integer));
     row.extend(study.conditions[plan.condition].values.iter().cloned());
     row.extend([integer(plan.trial), flag(plan.practice), plan.repeats.map_or(Value::Absent, integer), flag(faults.is_empty())]);
+    // The faults are those of the session: a repetition that was asked for later is not in the record.
     row.push(text(&faults.iter().map(|fault| fault.name()).collect::<Vec<_>>().join(" ")));
+    // Seeds of trials have 53 bits, so the bound is never reached.
     row.push(Value::Integer(i64::try_from(plan.seed).unwrap_or(i64::MAX)));
     row.extend([text(&record.outcome), Value::Number(record.time_s), Value::Integer(i64::try_from(record.late_ticks).unwrap_or(i64::MAX))]);
+    // A dry run has no browsers, so its list of round trips is empty and an index would panic.
     let round_trip = record.round_trips.get(seat).copied().flatten();
     row.extend([round_trip.map(|trip| trip.p50_s), round_trip.map(|trip| trip.p99_s)].map(number));
     row.extend(study.measures.iter().map(|name| number(record.value(name))));
@@ -125,6 +130,7 @@ fn answer_rows(study: &Study, group: &Group, answer: &GivenAnswer) -> Vec<Row> {
         QuestionKind::Scale { .. } => values.iter().map(|value| row(&question.name, *value)).collect(),
         QuestionKind::Tlx => {
             let scales = TLX.iter().zip(&values).map(|((name, ..), value)| row(name, *value));
+            // The raw index is the plain mean: weights of the scales would need 15 comparisons of pairs more (Hart & Staveland 1988).
             scales.chain([row("raw", mean(&values))]).collect()
         }
     }

@@ -58,9 +58,11 @@ impl Study {
     /// Returns a modelled person of the study.
     #[must_use]
     pub fn person(&self, code: PersonCode) -> Person {
+        // With groups of one, the index of the group is the index of the person, whatever the size of the groups.
         let (group, _) = code.place(1);
         let stream = Stream::new(self.seed, b"study person");
         let factor = |key: u8| {
+            // Each property has draws of its own, so that the properties are independent over persons.
             let mut words = stream.copy(group.index() as u64, key).draws(Purpose::Study);
             // Box & Muller (1958), from two uniform numbers. 1 − u is above zero.
             let (radius, angle) = (words.next_unit(), words.next_unit());
@@ -93,11 +95,13 @@ impl StudyFolder {
     ///
     /// [`StudyError`] if a person's scene is refused, or if a file cannot be written.
     pub fn play_dry(&mut self, watch: &dyn Watch) -> Result<bool, StudyError> {
+        // `next_group` gives an interrupted session before a new one, so a stopped run goes on where it stopped.
         while let Some(mut session) = self.next_group() {
             if !self.play_session(&mut session, watch)? {
                 return Ok(false);
             }
         }
+        // Tables are written once at the end, because each writing reads the records of all trials.
         self.write_tables()?;
         Ok(true)
     }
@@ -122,6 +126,7 @@ impl StudyFolder {
                     let answer = self.drawn_answer(session, seat, question);
                     self.keep(session, Event::Answered(answer))?;
                 }
+                // Modelled persons need no rest, but the event is kept so that the session has the form of a session with people.
                 Step::Break { .. } => self.keep(session, Event::BreakOver)?,
                 Step::Done | Step::Abandoned => return Ok(true),
             }
@@ -134,6 +139,7 @@ impl StudyFolder {
         let staging = self.staging()?;
         let file = staging.join("scene.toml");
         write_whole(&file, |to| std::io::Write::write_all(to, trial.text.as_bytes())).map_err(StudyError::file("write", &file))?;
+        // The content is read from the written text, because the replay compares the head of the inputs with the same text.
         let content = scene_content_of_text(&trial.text, &file, &[])?;
         let inputs = staging.join("inputs.csv");
         let recorded = InputRecorder::create(&staging, &trial.scene, content).and_then(InputRecorder::finish);

@@ -89,6 +89,7 @@ impl StudyFolder {
         let study = self.study();
         let folder = self.path().join(RUNS);
         fs::create_dir_all(&folder).map_err(StudyError::file("make the folder", &folder))?;
+        // The kept run of the folder is the first of all runs, so the further runs have the numbers from 1.
         let further = (1..times).into_par_iter().map(|number| {
             let run = run_of(study, number, &folder.join(format!("{number:05}.json")), watch)?;
             if run.is_some() {
@@ -97,6 +98,7 @@ impl StudyFolder {
             Ok(run)
         });
         let further: Vec<Option<Run>> = further.collect::<Result<_, StudyError>>()?;
+        // Errors are returned before stopped runs are looked at: an error must not pass for an interruption.
         let Some(further) = further.into_iter().collect::<Option<Vec<Run>>>() else { return Ok(None) };
         let first = Run::of(study, &self.analysis()?);
         Ok(Some(counted(study, &std::iter::once(first).chain(further).collect::<Vec<Run>>())))
@@ -108,6 +110,7 @@ fn run_of(study: &Study, number: u64, path: &Path, watch: &dyn Watch) -> Result<
     if path.exists() {
         let text = read_text(path).map_err(StudyError::file("read", path))?;
         let run: Run = serde_json::from_str(&text).map_err(|error| StudyError::damaged(path, error.to_string()))?;
+        // The shape is checked here, because `counted` indexes the figures by measure and condition.
         return if run.is_of(study) { Ok(Some(run)) } else { Err(StudyError::damaged(path, "it has figures of other measures or conditions")) };
     }
     // Another seed: other persons, other seeds of trials, other shuffled orders.
@@ -123,9 +126,11 @@ fn run_of(study: &Study, number: u64, path: &Path, watch: &dyn Watch) -> Result<
 pub(super) fn analysis_of(study: &Study, watch: &dyn Watch) -> Result<Option<Analysis>, StudyError> {
     let mut trials: Vec<(usize, TrialPlan, Vec<Person>)> = Vec::new();
     for unit in 0..study.groups {
+        // Without questions and breaks every step is a trial, and the loop below sees the whole session.
         let mut session = Sequence::new(&Study { questions: Vec::new(), breaks: None, ..study.clone() }, GroupCode::of_index(unit), unit);
         let persons = study.persons_of(&session);
         while let Step::Trial(plan) = session.step() {
+            // Practice is not played but counted: the numbers of the trials, and so their seeds, are those of a session with practice.
             trials.extend((!plan.practice).then(|| (unit, plan, persons.clone())));
             session.handle(Event::TrialEnded { faults: Vec::new() })?;
         }
@@ -141,6 +146,7 @@ pub(super) fn analysis_of(study: &Study, watch: &dyn Watch) -> Result<Option<Ana
         let values = study.measures.iter().map(value).collect();
         Ok(Some(Observation { unit: *unit, condition: plan.condition, trial: plan.trial, timed_out, values }))
     };
+    // All trials are planned before the first is run, because a plan needs its session and a run needs only the plan.
     let observations: Vec<Option<Observation>> = trials.par_iter().map(observe).collect::<Result<_, StudyError>>()?;
     let observations: Option<Vec<Observation>> = observations.into_iter().collect();
     Ok(observations.map(|observations| Analysis::of(study, study.groups, &observations)))
@@ -152,6 +158,7 @@ fn counted(study: &Study, runs: &[Run]) -> Power {
     let mut differences = Vec::new();
     for (measure, name) in study.measures.iter().enumerate() {
         for condition in 1..study.conditions.len() {
+            // A run without figures stays in the number of runs: a difference that cannot be computed is not found.
             let figures: Vec<[f64; 3]> = runs.iter().filter_map(|run| run.differences[measure][condition - 1]).collect();
             let below = |place: usize| share(figures.iter().filter(|figures| figures[place] < LEVEL).count());
             let means: Vec<f64> = figures.iter().map(|figures| figures[0]).collect();
