@@ -185,6 +185,7 @@ async fn listen(taken: &Option<Taken>, mut incoming: impl Incoming<Item = Result
     while let Some(Ok(message)) = incoming.next().await {
         match (message, taken) {
             (Message::Text(text), Some(Taken { hands, hand, .. })) => {
+                // A position is tried first: positions are nearly all messages, and no word of a page is a list of numbers or null.
                 let understood = match read(&text) {
                     Some(place) => hands.move_hand(*hand, place),
                     None => hands.hear(*hand, &text),
@@ -222,6 +223,7 @@ async fn show(hands: &dyn Hands, taken: &Option<Taken>, pass: &Pass, mut out: im
     let (mut shown, mut told, mut last) = (0, 0, Instant::now());
     loop {
         ticks.tick().await;
+        // The pass is checked at each tick and not only once, because a study replaces the tokens while old pages are still connected.
         if !pass.is_valid() {
             return;
         }
@@ -245,6 +247,7 @@ async fn show(hands: &dyn Hands, taken: &Option<Taken>, pass: &Pass, mut out: im
             shown = number;
             messages.push(Message::text(frame.to_string()));
         }
+        // Only text ends a silence, because browsers do not show pings to the page.
         if messages.iter().any(Message::is_text) {
             last = now;
         } else if now > last + SILENCE {
@@ -261,6 +264,7 @@ async fn show(hands: &dyn Hands, taken: &Option<Taken>, pass: &Pass, mut out: im
 
 /// Sends a message. Returns whether the page accepted the message in time.
 async fn send(out: &mut (impl Sink<Message> + Unpin), message: Message) -> bool {
+    // Without this bound a page that stops reading would keep its hand for as long as the connection stays open.
     matches!(timeout(PATIENCE, out.send(message)).await, Ok(Ok(())))
 }
 

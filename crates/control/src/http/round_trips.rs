@@ -43,6 +43,7 @@ impl RoundTrips {
         }
         let number = pings.next;
         (pings.next, pings.latest) = (number + 1, Some(now));
+        // The list is bounded, because pings stay open without an answer, and a short `every` opens many before the silence ends the connection.
         if pings.open.len() == REMEMBERED {
             pings.open.pop_front();
         }
@@ -52,6 +53,7 @@ impl RoundTrips {
 
     /// Ends the round trip of an answer, and returns the time of the trip. `None` for an answer to no open ping.
     pub(super) fn end(&self, echo: &[u8], now: Instant) -> Option<Duration> {
+        // A page may send any Pong, also unasked and of any length, so the content is not trusted to be a number of a ping.
         let number = u64::from_be_bytes(echo.try_into().ok()?);
         let mut pings = self.pings();
         let at = pings.open.iter().position(|(open, _)| *open == number)?;
