@@ -35,6 +35,7 @@ impl PathTask {
     /// Returns the point of the line after a length `along` \[m\]: an end of the line for a length below zero or above the length of the line.
     #[must_use]
     pub fn point(&self, along: f64) -> [f64; 3] {
+        // A length below zero would extend the first leg backwards beyond the first corner.
         let mut left = along.max(0.0);
         for corners in self.points.windows(2) {
             let length = distance(corners[0], corners[1]);
@@ -43,6 +44,7 @@ impl PathTask {
             }
             left -= length;
         }
+        // The subtraction of rounded lengths can leave a remainder after the last leg, also for the length of the whole line.
         self.points.last().copied().unwrap_or_default()
     }
 
@@ -57,11 +59,13 @@ impl PathTask {
             let end = begin + length;
             if end >= progress && begin <= last {
                 let [a, b] = [corners[0], corners[1]];
+                // Neighbouring corners differ, as the reader of scenes has checked, so no leg has the length zero.
                 let projected = (0..3).map(|axis| (position[axis] - a[axis]) * (b[axis] - a[axis])).sum::<f64>() / length;
                 let (low, high) = ((progress - begin).max(0.0), (last - begin).min(length));
                 // The ends are taken as they are: a rounded sum would never be the length of the line.
                 let (along, at) = if projected >= high { (high, last.min(end)) } else { (projected.max(low), begin + projected.max(low)) };
                 let away = distance(position, between(corners, along / length));
+                // A strict comparison keeps the first of equally near points, as at a corner that belongs to two legs.
                 if away < nearest.1 {
                     nearest = (at, away);
                 }
