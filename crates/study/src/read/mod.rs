@@ -97,7 +97,10 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Study> {
     let hands = hands(&scene);
     if hands.len() != group {
         let hands = if hands.is_empty() { "no pointer".to_owned() } else { format!("the pointers {}", hands.join(", ")) };
-        let message = format!("the scene has {hands}, and a group has {}: expected a pointer for each person", Counted(group, "person"));
+        let group = Counted(group, "person");
+        let message = format!(
+            "the scene has {hands}, and a group has {group}: expected a pointer for each person (kind = \"pointer\" of a peer, or of [peer] for all)"
+        );
         context.fault_at(header.scene_node?, message);
         return None;
     }
