@@ -71,7 +71,7 @@ pub(crate) enum Command {
     Live(LiveArguments),
     /// Opens a page on which people pull the object by mouse, finger or stick, and see what the network does to it
     Play(PlayArguments),
-    /// Runs a study with people in groups: conditions in balanced orders, questions, tables and a report; or a dry run, with its power
+    /// Runs a study with people in groups, or with modelled persons: balanced orders, questions, tables, a report, and the power of the design
     Study(StudyArguments),
     /// Puts the emulator between programs that speak UDP to each other
     Relay(RelayArguments),

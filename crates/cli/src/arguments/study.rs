@@ -22,9 +22,9 @@ pub(crate) enum StudyCommand {
     Run(StudyRunArguments),
     /// Writes the tables and the report again, from the kept trials and answers
     Report(StudyFolderArguments),
-    /// Replays every trial, and compares the measures, the scenes and the tables with what is kept
+    /// Replays every trial, and names each difference to the kept measures, scenes and tables
     Verify(StudyFolderArguments),
-    /// Removes everything about a person, and writes the tables again
+    /// Removes the answers of a person and all trials of the person's group, and writes the tables again
     Forget(StudyForgetArguments),
 }
 
@@ -33,10 +33,10 @@ pub(crate) enum StudyCommand {
 pub(crate) struct StudyRunArguments {
     /// The study, a TOML file
     pub(crate) study: PathBuf,
-    /// Let modelled persons play, through the same orders, trials and tables as people
+    /// Let modelled persons play in place of people, through the same orders, trials and tables
     #[arg(long, conflicts_with = "RealTimeArguments")]
     pub(crate) dry_run: bool,
-    /// Number of dry runs, each with other persons: says how often each difference is found
+    /// Number of dry runs, each with other persons. The output tells how often each difference is found
     #[arg(long, value_name = "N", default_value_t = 1, requires = "dry_run", allow_negative_numbers = true, value_parser = integer::<u64>(1, 99_999))]
     pub(crate) times: u64,
     /// Folder of the study: trials, answers, tables and report.html. Repeat the command to go on from there
