@@ -1,4 +1,4 @@
-//! When a push is felt through a server, and when displacements in place of states make no difference.
+//! Instants at which a push is felt through a server, and the links over which displacements in place of states make no difference.
 //!
 //! **Claim** (derived in `docs/claims.md`). Over a constant delay of d ticks and with a sample every M ticks, a client that is pushed at tick 0 is first felt by
 //! another client at tick M·⌈(M + d + 1)/M⌉ + d. With average-position it is felt at tick M + d + 1, for M of at least 2.

@@ -39,7 +39,7 @@ pub enum TaskEnd {
 pub enum Judged {
     /// The peers whose devices touch the object at any time of the scene, judged together.
     All,
-    /// The same peers, each judged alone: the first peer whose copy fulfils the whole task ends the task.
+    /// The peers of `All`, each judged alone: the first peer whose copy fulfils the whole task ends the task.
     Any,
     /// A single peer, by the index in [`Scene::peers`](crate::Scene::peers).
     Peer(usize),

@@ -107,7 +107,7 @@ impl StudyFolder {
     }
 }
 
-/// Outcome of a trial that counts as its timeout.
+/// Outcome, as in the records, of a trial whose task timed out. Such a trial has the timeout as its time.
 pub(crate) const TIMED_OUT: &str = "timed-out";
 
 fn measure(study: &Study, units: usize, observations: &[Observation], place: usize, name: &str) -> Analysed {

@@ -8,7 +8,7 @@ use cohaptic_linkfile::FileError;
 use crate::codes::PersonCode;
 use crate::sequence::SequenceError;
 
-/// Why a study cannot begin or go on.
+/// Reason for which a study cannot begin or go on.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// The study file or its scene is refused.
@@ -39,7 +39,7 @@ pub enum StudyError {
         /// The folder.
         path: PathBuf,
     },
-    /// Another process works on the folder.
+    /// The folder is in use by another process.
     #[error("another process works on the study in {}: wait until it has ended, or choose another folder", path.display())]
     Busy {
         /// The folder.
@@ -53,7 +53,7 @@ pub enum StudyError {
         /// The fault.
         message: String,
     },
-    /// Nobody in the study has the code.
+    /// The code belongs to nobody in the study.
     #[error("nobody in the study in {} has the code {person}: expected a code such as those in answers.csv", path.display())]
     Nobody {
         /// The folder.

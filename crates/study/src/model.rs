@@ -113,7 +113,7 @@ pub struct Question {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum After {
-    /// After each analysed trial, repeated trials included.
+    /// After each trial that is no practice: after a trial that is not valid, and after its repetition, too.
     Trial,
     /// After the last trial of each condition.
     Condition,
@@ -127,7 +127,7 @@ pub enum After {
 pub enum QuestionKind {
     /// The six scales of the NASA Task Load Index (Hart & Staveland 1988), 0 to 100 in steps of 5, without weights.
     Tlx,
-    /// One scale with equal steps.
+    /// A single scale with equal steps.
     Scale {
         /// The question.
         text: String,

@@ -136,7 +136,7 @@ fn answer_rows(study: &Study, group: &Group, answer: &GivenAnswer) -> Vec<Row> {
     }
 }
 
-/// Returns the cells of the group and of a person.
+/// Returns the first cells of a row: group, state of the session, code and hand of the person.
 fn about_person(study: &Study, group: &Group, seat: usize) -> Row {
     let code = group.code.person(seat, study.group_size());
     vec![text(&group.code.to_string()), text(group.state_name()), text(&code.to_string()), text(&study.hands[seat])]

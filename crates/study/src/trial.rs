@@ -24,7 +24,7 @@ pub struct TrialScene {
     /// Text of the scene file: the scene of the study with the values of the condition, the seed of the trial and the analysed measures. The run ends with its
     /// task.
     pub text: String,
-    /// The same scene, read.
+    /// Scene of `text`, read.
     pub scene: Scene,
     /// Index in [`Scene::peers`] of the hand of each person, indexed by seat.
     pub hands: Vec<usize>,

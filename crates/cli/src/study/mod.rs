@@ -120,7 +120,7 @@ fn verify(arguments: &StudyFolderArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(EXPECTATION))
 }
 
-/// Removes everything about a person.
+/// Removes the answers of a person and all trials of the person's group.
 fn forget(arguments: &StudyForgetArguments) -> Result<ExitCode, Failure> {
     let mut folder = open(&arguments.folder)?;
     folder.forget(arguments.person).map_err(failure)?;
@@ -138,7 +138,7 @@ fn open(folder: &Path) -> Result<StudyFolder, Failure> {
     StudyFolder::of_folder(folder, PROGRAM).map_err(failure)
 }
 
-/// Returns the failure of an error of a study.
+/// Converts the error of a study to the failure of the command, which has the exit status.
 fn failure(error: StudyError) -> Failure {
     match error {
         StudyError::Study(error) => Failure::Scene(error),

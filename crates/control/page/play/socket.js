@@ -8,7 +8,7 @@ const AGAIN = 1000;
 let ownHand = null;
 let socket = null;
 
-/** What ends the connection for good. */
+/** Ends the connection for good. */
 let disconnect = () => {};
 
 /** Connects for ever. `onFrame` gets each picture, `onNews` what a study says, `onTrouble` a text when the connection is lost, and null when it is back. */

@@ -19,7 +19,7 @@ async function command(what, expects) {
   }
 }
 
-/** What cannot be taken back is pressed twice. */
+/** Gives a button a command that cannot be taken back: the first press only asks, and the second press commands. */
 function twice(button, what, question) {
   button.addEventListener('click', () => {
     if (sure && sure.button === button) {
@@ -59,7 +59,7 @@ function show(study) {
     name.scope = 'row';
     const state = connected ? (hidden ? 'page hidden' : 'connected') : 'not connected';
     const cell = make('td');
-    // Nobody is missed at the last page.
+    // A person on the last page may leave, so that a lost connection is no fault there.
     const missed = page === 'thanks' || page === 'abandoned' ? '' : 'bad';
     cell.append(make('span', 'pill ' + (connected && !hidden ? 'good' : missed), state));
     tr.append(name, make('td', '', PAGE_NAMES[page] || page), cell, make('td', 'n', trip === null || !connected ? '–' : span(trip, 2)));

@@ -1,6 +1,6 @@
 // ---- The pages of a person: what the server says is shown, one page after the other.
 
-/** What the server said last. */
+/** The latest message of the server about the page. */
 let now = { page: '' };
 /** Pages after which nothing comes: the connection ends. */
 const LAST = ['refused', 'thanks', 'abandoned'];
@@ -30,7 +30,7 @@ function button(text, className, act) {
 
 const trialName = ({ number, of, practice }) => 'Trial ' + number + ' of ' + of + (practice ? ', for practice' : '');
 
-/** What stands on each page: heading, content, buttons, and what has the focus at first. */
+/** Content of each page: heading, text and buttons. `read`: the heading has the focus at first. */
 const PAGES = {
   code: () => ({ title: 'Your code', content: [make('p', 'code', now.code), make('p', '', 'The code stands for you in all that is kept. No name is kept. Note the code: with it you can ask to have all of yours removed, also later.')], buttons: [button('Begin', '', () => say({ do: 'begin' }))] }),
   consent: () => ({ title: 'Consent', content: blocks(now.text), buttons: [button('I agree', '', () => say({ do: 'consent' })), button('I do not agree', 'plain', () => say({ do: 'refuse' }))], read: true }),
@@ -76,7 +76,7 @@ function onNews(news) {
 
 function showWords(before) {
   const { title, content, buttons = [], read } = PAGES[now.page]();
-  // What somebody fills in stays when the same page is told again, such as after a lost connection.
+  // Given answers stay when the same page is told again, such as after a lost connection.
   if (JSON.stringify({ ...before, left_s: 0 }) === JSON.stringify({ ...now, left_s: 0 })) {
     // A button that was pressed before the connection was lost may have had no effect.
     for (const button of document.querySelectorAll('#buttons button')) button.disabled = false;
@@ -99,7 +99,7 @@ function showWords(before) {
   scrollTo(0, 0);
 }
 
-/** When the break may end, by the clock of this page [ms]. */
+/** Instant at which the break may end, by the clock of this page [ms]. */
 let breakEnd = 0;
 function showLeft() {
   if (!$('left').hidden) put($('left'), clock(Math.ceil(Math.max(0, breakEnd - performance.now()) / 1000)) + ' left');
@@ -131,7 +131,7 @@ function tellSeen() {
   if (socket && socket.readyState === WebSocket.OPEN) socket.send(document.hidden ? 'hidden' : 'seen');
 }
 
-/** When the server heard of this page last, by the clock of this page [ms]. A hand that holds tells its place with each picture. */
+/** Instant of the latest message to the server, by the clock of this page [ms]. A hand that holds tells its place with each picture. */
 let heard = 0;
 const STILL_HERE = 100;
 

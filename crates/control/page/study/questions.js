@@ -51,7 +51,7 @@ function makeScales({ question, scales }) {
   return { question, fields, answer, missing };
 }
 
-/** One choice of equal steps, with words at both ends. */
+/** Makes a choice of equal steps, with words at both ends. */
 function makeChoice({ question, text, ends: [low, high], steps }) {
   const fields = make('fieldset');
   const row = make('div');

@@ -14,7 +14,7 @@ use crate::run::{NoLinks, TOKEN, empty_board};
 const PATIENCE: Duration = Duration::from_secs(60);
 const ORIGIN: &str = "http://evil.example";
 
-/// A study that writes down what it is told.
+/// Study that records the calls of the server.
 #[derive(Default)]
 struct Recorder {
     told: Mutex<Vec<String>>,

@@ -189,7 +189,7 @@ fn operators_are_described_with_their_parameters() {
     assert_eq!(found(&tracks), [row("operator of peer1, peer2", format!("{crossover}; {arm}"))]);
 }
 
-/// What a server makes of displacements, and what its clients feel, is said only where it is not as usual.
+/// `explain` names the use of displacements by a server, and the forces of its clients, only where a scene changes the defaults.
 #[test]
 fn displacements_and_missing_forces_are_said() {
     let of = |sends: &str, returns: &str| {

@@ -246,7 +246,7 @@ fn a_task_is_under_way_from_its_start_to_its_deadline() {
     assert_eq!([1, 2, 4, 5].map(&mut is_under_way), [false, true, true, false]);
 }
 
-/// What an operator is asked for on a path: the point w/(4c) ahead of the progress of those who are judged together.
+/// On a path, an operator is asked for the point w/(4c) ahead of the progress of all copies that are judged together.
 #[test]
 fn a_path_asks_for_a_point_ahead() {
     let asks = |who: &str, noise: f64| {

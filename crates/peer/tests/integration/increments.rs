@@ -128,7 +128,7 @@ proptest! {
         }
     }
 
-    /// What a client sends adds up to the motion of its device, whatever the order of arrival; what gets lost stays missing.
+    /// The displacements from a client add up to the motion of its device in every order of arrival; a lost displacement stays missing.
     #[test]
     fn all_displacements_together_are_the_motion(lost in vec(any::<bool>(), 60), order in Just((0..60_usize).collect::<Vec<_>>()).prop_shuffle()) {
         let hand = Hand::Force(Signal::Constant([0.7, 0.0, 0.0]));
@@ -146,7 +146,7 @@ proptest! {
             let len = sample.encode_as(SampleKind::Increment, &extra, 1, &mut bytes);
             sent.push(bytes[..len].to_vec());
             let now = Instant::from_nanos(tick * 1_000_000);
-            // Nothing is returned, so that the device feels its hand alone.
+            // The server returns no force, so that the device feels its hand alone.
             prop_assert_eq!(client.compute(now).coupling, [0.0]);
             client.advance(now, TICK);
         }

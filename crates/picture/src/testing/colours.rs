@@ -14,7 +14,6 @@ const LINE: f64 = 3.0;
 /// the dark style, or a colour with too little contrast to the background.
 ///
 /// Backgrounds, and lines that only guide the eye (grid of a plot, borders of a table), need no contrast.
-/// Grounds and lines that only guide the eye (the grid of a plot, the borders of a table) need no contrast.
 #[must_use]
 pub fn colour_faults() -> Vec<String> {
     let picture = of_style(&crate::look::style(), "paper", &["paper", "grid"], |name| ["ink", "quiet"].contains(&name));

@@ -43,7 +43,7 @@ fn displacements_are_followed_where_they_add_up_to_positions() {
     }
 }
 
-/// Nothing comes back, so the object swings alone on the couplings to two devices. The couplings are sampled at each tick h: with K = 200 N/m, B = 10 N·s/m and
+/// No force comes back, so the object swings alone on the couplings to two devices. The couplings are sampled at each tick h: with K = 200 N/m, B = 10 N·s/m and
 /// m = 0.45 kg the product of both eigenvalues of a tick is 1 − B·h/m + K·h²/(2·m) = 0.978. The devices on their arms come to rest sooner.
 #[test]
 fn without_a_returned_force_the_object_swings_alone() {
@@ -72,7 +72,7 @@ fn displacements_over_a_line_that_does_more_than_delay_are_refused_by_name() {
         let states = read("coordination/client-server.toml", &[change]);
         assert!(analyse(&states, Method::Reduced).is_ok(), "{change}");
     }
-    // What the server sends may get lost: the clients of this scene hold a force less, and no sum.
+    // Samples from the server may get lost: a lost sample costs the clients of this scene one force, and no sum.
     let back = "links=[{ from = \"server\", to = \"left\", loss = { packets = [3], every = 10 } }]";
     analyse(&read("coordination/client-server.toml", &[increments, back]), Method::Reduced).unwrap();
 }

@@ -116,7 +116,7 @@ fn what_people_see_counts_in_what_makes_peers_equal() {
     }
 }
 
-/// Where both people watch one copy, hands may pull against each other without moving this copy. No person sees and corrects the pull, so the pull stays.
+/// If both people watch one copy, hands may pull against each other without moving this copy. No person sees and corrects the pull, so the pull stays.
 #[test]
 fn two_who_watch_one_copy_pull_against_each_other_without_end() {
     for name in ["two-see-a-third", "both-watch-one-copy"] {

@@ -1,8 +1,8 @@
 //! Dry runs: modelled persons play a study, through the same sessions, folder and tables as people.
 //!
-//! Each person has a duration of movements T, a visual delay τ and a noise c of their own: those of the study times e^(0.15·z), each with a normal z of its own
-//! address. Two thirds of the persons lie within ±16 % of the mean, and nearly all within ±36 %. Answers to questions are drawn evenly from the possible ones,
-//! so that they say nothing about the conditions.
+//! The duration of movements T, the visual delay τ and the noise c of a person are the values of the study times e^(0.15·z), with an independent normal z for
+//! each value of each person. Two thirds of these values lie within ±16 % of the mean, and nearly all within ±36 %. Answers to questions are drawn evenly from
+//! the possible answers, so that the answers say nothing about the conditions.
 
 mod power;
 #[cfg(test)]
@@ -84,7 +84,7 @@ impl StudyFolder {
     ///
     /// # Errors
     ///
-    /// As [`StudyFolder::open`].
+    /// Errors of [`StudyFolder::open`].
     pub fn open_dry(study: Study, path: &Path, program: &str) -> Result<Self, StudyError> {
         Self::begin(study, path, program, true)
     }

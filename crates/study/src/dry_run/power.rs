@@ -113,7 +113,7 @@ fn run_of(study: &Study, number: u64, path: &Path, watch: &dyn Watch) -> Result<
         // The shape is checked here, because `counted` indexes the figures by measure and condition.
         return if run.is_of(study) { Ok(Some(run)) } else { Err(StudyError::damaged(path, "it has figures of other measures or conditions")) };
     }
-    // Another seed: other persons, other seeds of trials, other shuffled orders.
+    // A seed of its own gives the dry run other persons, other seeds of trials and other shuffled orders.
     let seed = Stream::new(study.seed, b"study dry run").packet(number).first(Purpose::Study) >> 11;
     let Some(analysis) = analysis_of(&Study { seed, ..study.clone() }, watch)? else { return Ok(None) };
     let run = Run::of(study, &analysis);

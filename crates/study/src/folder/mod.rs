@@ -14,7 +14,7 @@
 //! pictures/task_time_s.svg        picture of a measure, or of a question
 //! ```
 //!
-//! Nothing is kept of a person but codes, motion and answers: no name, no address, and no time of day.
+//! A person is kept as code, motion and answers: no name, no address, and no time of day.
 //!
 //! A trial gets its final name, and an event its line, when all bytes are on the disk. After a crash a session continues at the first trial, answer or break
 //! that is not kept. A trial with its final name counts, even if the process was killed before the event of the trial was written.

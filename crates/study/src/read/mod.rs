@@ -38,7 +38,7 @@ impl Study {
     ///
     /// # Errors
     ///
-    /// As [`Study::read`].
+    /// Errors of [`Study::read`].
     pub fn parse(text: &str, file: &Path) -> Result<Self, FileError> {
         Self::parse_with(text, file, FileReader(&cohaptic_files::read_bytes))
     }

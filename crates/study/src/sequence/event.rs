@@ -63,7 +63,7 @@ impl Fault {
     }
 }
 
-/// Why a session refuses an event.
+/// Reason for which a session refuses an event.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum SequenceError {
     /// The session waits for something else.

@@ -357,7 +357,7 @@ impl Sequence {
         last.faults.push(Fault::Repeated);
         let TrialPlan { trial, practice, code, .. } = last.plan;
         self.left.push_back(Planned { trial, practice, repeats: Some(code.number) });
-        // Only this state treats the block as finished. In the other states the session finds the new trial in `left`.
+        // The state `Questions(Condition)` alone treats the block as finished. In the other states the session finds the new trial in `left`.
         if self.state == State::Questions(After::Condition) {
             self.advance();
         }

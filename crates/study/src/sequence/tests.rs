@@ -137,8 +137,8 @@ fn event() -> impl Strategy<Value = Event> {
 }
 
 proptest! {
-    /// Whatever comes in: refused events change nothing, the events make the state again, and a session that is completed has run each analysed trial of each
-    /// condition, and the repetition of each that was not valid.
+    /// Sessions of random events: refused events change nothing, the kept events make the state again, and a completed session has run each analysed trial of
+    /// each condition, and a repetition of each trial that was not valid.
     #[test]
     fn every_session_keeps_its_rules(events in prop::collection::vec(event(), 0..80), slot in 0_usize..6, abandons in any::<bool>()) {
         let study = study();

@@ -261,7 +261,7 @@ fn valid_trials_without_practice_are_analysed_and_a_timeout_counts_as_the_limit(
     assert_eq!(folder.analysis_of(&trials).measures[1].left_out, 2);
 }
 
-/// The session takes a trial only once the trial has its name.
+/// The session records a trial only after the folder of the trial has got its final name.
 #[test]
 fn a_trial_that_cannot_be_kept_changes_no_session() {
     let at = tempfile::tempdir().unwrap();

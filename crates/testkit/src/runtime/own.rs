@@ -207,7 +207,7 @@ impl Drop for Inner {
             if here.executor.get() == self.number {
                 here.executor.set(0);
                 here.waits.set(false);
-                // Both are dropped without a borrow: a foreign waker may have a destructor that wakes.
+                // Tasks and main waker are dropped without a borrow: a foreign waker may have a destructor that wakes.
                 drop((here.ready.take(), here.main.take()));
             }
         });

@@ -112,7 +112,7 @@ fn open(arguments: &StudyRunArguments, lab: &Arc<Lab>, board: &Arc<Board>, kept:
     };
     let port_of_before = kept.filter(|_| wanted.port() == 0).map(|access| SocketAddr::new(wanted.ip(), access.port));
     let server = match port_of_before.map(start) {
-        // Another program has the port meanwhile: people need their new addresses.
+        // The port belongs to another program meanwhile, so the server gets a new port, and people need new addresses.
         Some(Err(ServeError::Listen { .. })) | None => start(wanted),
         Some(other) => other,
     };

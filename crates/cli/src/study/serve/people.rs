@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::text::blocks;
 
-/// Way of a person to the first trial.
+/// Step of a person on the way to the first trial.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Way {
     /// The person sees the own code.
@@ -23,7 +23,7 @@ pub(super) enum Way {
 pub(super) enum Work {
     #[default]
     None,
-    /// Everybody is ready, and the trial is about to begin.
+    /// The trial is about to begin, because everybody is ready.
     Starting,
     Running,
     /// The trial has ended, and its record is being kept.
@@ -49,7 +49,7 @@ pub(super) struct People {
     pub(super) work: Work,
     /// `true` if the present break may end.
     pub(super) may_end_break: bool,
-    /// Line about the trial before, for the people.
+    /// Line for the people about the trial before, such as the reason for its repetition.
     pub(super) note: String,
     /// Facts of the running trial for the page that draws the trial; each person's hand is added.
     pub(super) facts: Value,

@@ -57,7 +57,7 @@ impl Person {
         false
     }
 
-    /// Nothing is scrolled sideways, every text can be read on light and on dark ground, and every control has a name.
+    /// Asserts that the page needs no scrolling sideways, every text can be read on light and on dark ground, and every control has a name.
     fn look(&mut self, page: &str) {
         assert_eq!(self.browser.value("document.documentElement.scrollWidth"), json!(WIDTH), "{page}");
         for scheme in ["dark", "light"] {
@@ -101,7 +101,7 @@ impl Person {
 
     /// Sends the answers too early, is shown what is missing, and answers all.
     fn answer(&mut self) {
-        // Other questions may follow at once.
+        // A page with further questions may follow at once.
         const ASKED: &str = "((input) => input && input.id + input.name)(document.querySelector('#questions input'))";
         let asked = self.browser.value(ASKED);
         let open = self.browser.value("document.querySelectorAll('#questions input[type=range]').length").as_u64().unwrap();
