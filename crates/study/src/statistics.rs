@@ -61,7 +61,7 @@ pub struct Difference {
     pub p_holm: f64,
 }
 
-/// Returns the difference of each condition but the first to the first. `rows` as in [`condition_means`]. `seed`: seed of drawn sign flips, as in [`sign_flip`].
+/// Returns the difference of each condition but the first to the first. `rows` as in [`condition_means`]. `seed`: seed of the draws of [`sign_flip`].
 #[must_use]
 pub fn differences_to_first(rows: &[Vec<f64>], seed: u64) -> Vec<Difference> {
     let conditions = rows.first().map_or(0, Vec::len);

@@ -43,7 +43,7 @@ fn displacements_are_followed_where_they_add_up_to_positions() {
     }
 }
 
-/// No force comes back, so the object swings alone on the couplings to two devices. The couplings are sampled at each tick h: with K = 200 N/m, B = 10 N·s/m and
+/// No force comes back, so the object swings alone on couplings to two devices. The couplings are sampled at each tick h: with K = 200 N/m, B = 10 N·s/m and
 /// m = 0.45 kg the product of both eigenvalues of a tick is 1 − B·h/m + K·h²/(2·m) = 0.978. The devices on their arms come to rest sooner.
 #[test]
 fn without_a_returned_force_the_object_swings_alone() {

@@ -41,15 +41,15 @@ fn every_refusal_has_a_place_and_a_way_out() {
         ("group = 2", "group = 3", "study.toml:5:9: study.scene", "a pointer for each person"),
         ("practice = 2", "practise = 2", "study.toml:11:1: study.practise", "did you mean \"practice\"?"),
         ("order = \"williams\"", "order = \"wiliams\"", "study.toml:8:9: study.order", "did you mean \"williams\"?"),
-        ("\"task_time_s\"", "\"task_time\"", "study.toml:33:13: analysis.measures.0", "did you mean \"task_time_s\"?"),
-        ("\"internal_force_n\"", "\"effort_n2_s\"", "study.toml:33:28: analysis.measures.1", "peers.left.effort_n2_s"),
-        ("\"internal_force_n\"", "\"task_time_s\"", "study.toml:33:28: analysis.measures.1", "each measure once"),
+        ("\"task_time_s\"", "\"task_time\"", "study.toml:34:13: analysis.measures.0", "did you mean \"task_time_s\"?"),
+        ("\"internal_force_n\"", "\"effort_n2_s\"", "study.toml:34:28: analysis.measures.1", "peers.left.effort_n2_s"),
+        ("\"internal_force_n\"", "\"task_time_s\"", "study.toml:34:28: analysis.measures.1", "each measure once"),
         ("\"0ms\", \"100ms\"", "\"0ms\", \"0ms\"", "study.toml:18:16: conditions.link.delay", "expected"),
         ("\"0ms\", \"100ms\"", "\"0ms\", \"100 parsecs\"", "link.delay", "unknown unit"),
         ("\"link.delay\" =", "\"link.dealy\" =", "link.dealy", "did you mean \"delay\"?"),
         ("kind = \"tlx\"", "kind = \"tlx\"\nsteps = 3", "study.toml:23:9: questions.0.steps", "only a question of the kind scale"),
-        ("steps = 7", "step = 7", "study.toml:30:1: questions.1.step", "did you mean \"steps\"?"),
-        ("ends = [\"not at all\", \"completely\"]", "ends = [\"not at all\"]", "study.toml:29:8: questions.1.ends", "two texts"),
+        ("steps = 7", "step = 7", "study.toml:31:1: questions.1.step", "did you mean \"steps\"?"),
+        ("ends = [\"not at all\", \"completely\"]", "ends = [\"not at all\"]", "study.toml:30:8: questions.1.ends", "two texts"),
         ("\"consent.md\"", "\"consnet.md\"", "study.toml:13:11: study.consent", "cannot read"),
         ("[task]\nkind = \"reach\"", "[tsak]\nkind = \"reach\"", "study.toml:5:9: study.scene", "did you mean \"task\"?"),
         ("kind = \"pointer\"", "kind = \"simulated\"", "study.toml:5:9: study.scene", "no pointer"),
@@ -66,12 +66,19 @@ fn every_refusal_has_a_place_and_a_way_out() {
             "study.toml:16:1: conditions",
             "names the file delays.csv",
         ),
-        ("[analysis]\nmeasures", "[analysis]\nmeasure", "study.toml:33:1: analysis.measure", "did you mean \"measures\"?"),
+        ("[analysis]\nmeasures", "[analysis]\nmeasure", "study.toml:34:1: analysis.measure", "did you mean \"measures\"?"),
     ] {
         let error = read(from, to).expect_err(to);
         assert!(error.contains(place) && error.contains(words), "{to}:\n{error}");
         assert!(error.contains("expected"), "{to}:\n{error}");
     }
+}
+
+#[test]
+fn a_question_without_a_name_has_its_kind_and_its_number() {
+    let study = read("name = \"workload\"\n", "").unwrap_or_else(|error| panic!("{error}"));
+    let names: Vec<&str> = study.questions.iter().map(|question| question.name.as_str()).collect();
+    assert_eq!(names, ["tlx1", "together"]);
 }
 
 #[test]

@@ -110,8 +110,8 @@ fn answers_are_checked_and_all_people_answer_before_the_session_goes_on() {
         session.handle(event).unwrap();
     }
     let given = |seat, question, values: &[u32]| Event::Answered(Answer { seat, question, values: values.to_vec() });
-    assert_eq!(session.handle(given(0, 0, &[0, 5, 100, 50, 20, 52])), Err(SequenceError::NoAnswer { question: "tlx1".to_owned() }));
-    assert_eq!(session.handle(given(0, 0, &[0, 5, 100])), Err(SequenceError::NoAnswer { question: "tlx1".to_owned() }));
+    assert_eq!(session.handle(given(0, 0, &[0, 5, 100, 50, 20, 52])), Err(SequenceError::NoAnswer { question: "workload".to_owned() }));
+    assert_eq!(session.handle(given(0, 0, &[0, 5, 100])), Err(SequenceError::NoAnswer { question: "workload".to_owned() }));
     assert_eq!(session.handle(given(2, 0, &[0; 6])), Err(SequenceError::NotAsked));
     assert_eq!(session.handle(given(0, 1, &[1])), Err(SequenceError::NotAsked));
     assert_eq!(session.handle(given(0, 0, &[0, 5, 100, 50, 20, 55])), Ok(()));
