@@ -407,10 +407,10 @@ fn exchanges(exchange: Exchange) -> String {
     };
     match exchange {
         Exchange::EACH_TICK => String::new(),
-        Exchange { late: false, .. } => format!(", read {every}; it keeps the force of an exchange until the next"),
-        Exchange { every: 1, late: true } => ", read each tick, and felt by the coupling a tick later".to_owned(),
+        Exchange { late: false, .. } => format!("; the device exchanges {every}, and keeps each force until the next exchange"),
+        Exchange { every: 1, late: true } => "; the readings of the device are a tick old".to_owned(),
         Exchange { late: true, .. } => {
-            format!(", read {every} and felt by the coupling an exchange later; it keeps the force of an exchange until the next")
+            format!("; the device exchanges {every}, keeps each force until the next exchange, and its readings are an exchange old")
         }
     }
 }
