@@ -1,7 +1,7 @@
 //! `report.html`: means with intervals, differences to the first condition, and curves over trials, as a page without scripts and without external content.
 
 use cohaptic_picture::page::{Html, Page, Table};
-use cohaptic_picture::{Axis, Fill, Line, Look, Marker, Panel, Picture, Region};
+use cohaptic_picture::{Axis, Fill, Line, Look, Marker, Panel, Picture, Region, Size};
 use cohaptic_scene::{Measure, Scope};
 use cohaptic_units::print::{Counted, SixDigits};
 
@@ -156,7 +156,9 @@ fn section(study: &Study, measure: &Analysed) -> Html {
     if measure.rows.is_empty() {
         return Html::section(&measure.name, content.and(Html::paragraph("No group has a value in every condition.")));
     }
-    content = content.and(Html::figure("", Html::picture(&picture(study, measure).svg())));
+    // A picture per panel fits the width of a phone, and on wider screens both stand side by side.
+    let narrow = |panel: Panel| Html::picture(&Picture::new("").aspect(0.5).size(Size::ONE_COLUMN).panel(panel).svg());
+    content = content.and(Html::figure("", Html::beside(panels(study, measure).into_iter().map(narrow))));
     Html::section(&measure.name, content.and(figures(study, measure)))
 }
 
@@ -209,8 +211,13 @@ pub(crate) fn p_text(p: f64) -> String {
     if p < 0.0001 { "< 0.0001".to_owned() } else { format!("{p:.4}") }
 }
 
-/// Draws the means with their intervals, a row per condition, and the curves over trials.
+/// Draws the panels of a measure or of a question below each other.
 fn picture(study: &Study, measure: &Analysed) -> Picture {
+    panels(study, measure).into_iter().fold(Picture::new("").aspect(0.5), Picture::panel)
+}
+
+/// Draws the means with their intervals, a row per condition, and the curves over trials.
+fn panels(study: &Study, measure: &Analysed) -> Vec<Panel> {
     let count = study.conditions.len();
     // The first condition is uppermost.
     let names: Vec<&str> = study.conditions.iter().rev().map(|condition| condition.label.as_str()).collect();
@@ -225,10 +232,9 @@ fn picture(study: &Study, measure: &Analysed) -> Picture {
         }
         rows = rows.with(Line::new([(mean.mean, y)], Look::of(condition)).marks_only(Marker::of(condition)));
     }
-    let picture = Picture::new("").aspect(0.5).panel(rows);
     // A curve of one trial would repeat the means, and a question has no trials.
     if measure.curves.is_empty() || study.trials < 2 {
-        return picture;
+        return vec![rows];
     }
     let curves = measure.curves.iter().zip(&study.conditions).enumerate().map(|(condition, (curve, about))| {
         let points = curve.iter().enumerate().map(|(trial, value)| (place(trial), *value));
@@ -236,7 +242,7 @@ fn picture(study: &Study, measure: &Analysed) -> Picture {
     });
     let numbers: Vec<String> = (1..=study.trials).map(|trial| trial.to_string()).collect();
     let trials = Axis::new("trial").categories(numbers.iter().map(String::as_str));
-    picture.panel(Panel::new(trials, Axis::new(measure.name.as_str())).titled("Means over trials").with_all(curves))
+    vec![rows, Panel::new(trials, Axis::new(measure.name.as_str())).titled("Means over trials").with_all(curves)]
 }
 
 fn place(number: usize) -> f64 {
