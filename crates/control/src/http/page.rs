@@ -8,74 +8,67 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use sha2::{Digest as _, Sha256};
 
-const STYLE: &str = include_str!("../../page/style.css");
-const SCRIPT: &str = concat!(
-    include_str!("../../page/server.js"),
-    include_str!("../../page/events.js"),
-    include_str!("../../page/words.js"),
-    include_str!("../../page/history.js"),
-    include_str!("../../page/plot.js"),
-    include_str!("../../page/links.js"),
-    include_str!("../../page/scales.js"),
-    include_str!("../../page/editor.js"),
-    include_str!("../../page/copies.js"),
-    include_str!("../../page/turn.js"),
-    include_str!("../../page/depth.js"),
-    include_str!("../../page/facts.js"),
-    include_str!("../../page/main.js"),
+/// Joins files of the folder `page`, as a constant text.
+macro_rules! files {
+    ($($name:literal),+) => {
+        concat!($(include_str!(concat!("../../page/", $name))),+)
+    };
+}
+
+/// Scripts of every page on which a person moves a hand and sees the scene.
+macro_rules! hand_scripts {
+    () => {
+        files!(
+            "turn.js",
+            "play/socket.js",
+            "play/motion.js",
+            "play/rooms.js",
+            "play/packets.js",
+            "play/task.js",
+            "play/draw.js",
+            "play/hand.js",
+            "play/keyboard.js",
+            "play/gamepad.js"
+        )
+    };
+}
+
+const STYLE: &str = files!("style.css");
+const SCRIPT: &str = files!(
+    "server.js",
+    "events.js",
+    "words.js",
+    "history.js",
+    "plot.js",
+    "links.js",
+    "scales.js",
+    "editor.js",
+    "copies.js",
+    "turn.js",
+    "depth.js",
+    "facts.js",
+    "main.js"
 );
 
-static PAGE: LazyLock<Document> = LazyLock::new(|| Document::new(include_str!("../../page/page.html"), STYLE, SCRIPT));
-static DOOR: LazyLock<Document> = LazyLock::new(|| Document::new(include_str!("../../page/door.html"), STYLE, include_str!("../../page/door.js")));
+static PAGE: LazyLock<Document> = LazyLock::new(|| Document::new(files!("page.html"), STYLE, SCRIPT));
+static DOOR: LazyLock<Document> = LazyLock::new(|| Document::new(files!("door.html"), STYLE, files!("door.js")));
 
-const PLAY_STYLE: &str = concat!(include_str!("../../page/style.css"), include_str!("../../page/play/style.css"));
+const PLAY_STYLE: &str = files!("style.css", "play/style.css");
 const PLAY_SCRIPT: &str = concat!(
-    include_str!("../../page/server.js"),
-    include_str!("../../page/words.js"),
-    include_str!("../../page/scales.js"),
-    include_str!("../../page/turn.js"),
-    include_str!("../../page/play/socket.js"),
-    include_str!("../../page/play/motion.js"),
-    include_str!("../../page/play/rooms.js"),
-    include_str!("../../page/play/packets.js"),
-    include_str!("../../page/play/task.js"),
-    include_str!("../../page/play/draw.js"),
-    include_str!("../../page/play/hand.js"),
-    include_str!("../../page/play/keyboard.js"),
-    include_str!("../../page/play/gamepad.js"),
-    include_str!("../../page/play/controls.js"),
-    include_str!("../../page/play/steps.js"),
-    include_str!("../../page/play/compare.js"),
-    include_str!("../../page/play/main.js"),
+    files!("server.js", "words.js", "scales.js"),
+    hand_scripts!(),
+    files!("play/controls.js", "play/steps.js", "play/compare.js", "play/main.js")
 );
 
-static PLAY: LazyLock<Document> = LazyLock::new(|| Document::new(include_str!("../../page/play/page.html"), PLAY_STYLE, PLAY_SCRIPT));
+static PLAY: LazyLock<Document> = LazyLock::new(|| Document::new(files!("play/page.html"), PLAY_STYLE, PLAY_SCRIPT));
 
-const STUDY_STYLE: &str =
-    concat!(include_str!("../../page/style.css"), include_str!("../../page/play/style.css"), include_str!("../../page/study/style.css"));
-const PERSON_SCRIPT: &str = concat!(
-    include_str!("../../page/server.js"),
-    include_str!("../../page/words.js"),
-    include_str!("../../page/turn.js"),
-    include_str!("../../page/play/socket.js"),
-    include_str!("../../page/play/motion.js"),
-    include_str!("../../page/play/rooms.js"),
-    include_str!("../../page/play/packets.js"),
-    include_str!("../../page/play/task.js"),
-    include_str!("../../page/play/draw.js"),
-    include_str!("../../page/play/hand.js"),
-    include_str!("../../page/play/keyboard.js"),
-    include_str!("../../page/play/gamepad.js"),
-    include_str!("../../page/study/words.js"),
-    include_str!("../../page/study/questions.js"),
-    include_str!("../../page/study/person.js"),
-);
-const EXPERIMENTER_SCRIPT: &str =
-    concat!(include_str!("../../page/server.js"), include_str!("../../page/words.js"), include_str!("../../page/study/experimenter.js"));
+const STUDY_STYLE: &str = files!("style.css", "play/style.css", "study/style.css");
+const PERSON_SCRIPT: &str =
+    concat!(files!("server.js", "words.js"), hand_scripts!(), files!("study/words.js", "study/questions.js", "study/person.js"));
+const EXPERIMENTER_SCRIPT: &str = files!("server.js", "words.js", "study/experimenter.js");
 
-static PERSON: LazyLock<Document> = LazyLock::new(|| Document::new(include_str!("../../page/study/person.html"), STUDY_STYLE, PERSON_SCRIPT));
-static EXPERIMENTER: LazyLock<Document> =
-    LazyLock::new(|| Document::new(include_str!("../../page/study/experimenter.html"), STUDY_STYLE, EXPERIMENTER_SCRIPT));
+static PERSON: LazyLock<Document> = LazyLock::new(|| Document::new(files!("study/person.html"), STUDY_STYLE, PERSON_SCRIPT));
+static EXPERIMENTER: LazyLock<Document> = LazyLock::new(|| Document::new(files!("study/experimenter.html"), STUDY_STYLE, EXPERIMENTER_SCRIPT));
 
 /// A page with its content security policy.
 struct Document {
