@@ -1,46 +1,13 @@
 //! People who track a target by the law crossover, against radii and boundaries that were computed apart from this program: see `tests/reference/README.md`.
 
-use cohaptic_scene::Scene;
 use cohaptic_stability::{
     Admittance, AdmittanceError, Analysis, AnalysisError, Family, FamilyScratch, Graph, GraphError, KeyRange, Method, StateKind, Unwatched, Verdict,
     analyse, analyse_loaded, analyse_on, analyse_spinning, judge, mean_square, monodromy,
 };
-use serde_json::Value;
 
-struct Case {
-    name: String,
-    text: String,
-    scene: Scene,
-    radius: f64,
-}
+use crate::reference_file::{Case, ReferenceFile, compare_boundary, compare_family, owned, parsed, parts};
 
-fn entries(kind: &str) -> Vec<Value> {
-    let all: Value = serde_json::from_str(include_str!("../reference/crossover.json")).unwrap();
-    all[kind].as_array().unwrap().clone()
-}
-
-fn text(entry: &Value, key: &str) -> String {
-    entry[key].as_str().unwrap().to_owned()
-}
-
-fn parsed(text: &str, overrides: &[&str]) -> Scene {
-    let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
-    Scene::parse(text, "tracking.toml".as_ref(), &overrides).unwrap()
-}
-
-fn cases() -> Vec<Case> {
-    let case = |entry: &Value| {
-        let text_of = |key: &str| text(entry, key);
-        Case { name: text_of("name"), scene: parsed(&text_of("scene"), &[]), text: text_of("scene"), radius: text_of("radius").parse().unwrap() }
-    };
-    let cases: Vec<Case> = entries("radii").iter().map(case).collect();
-    assert!(cases.len() > 20, "{}", cases.len());
-    cases
-}
-
-fn case(name: &str) -> Case {
-    cases().into_iter().find(|case| case.name == name).unwrap()
-}
+const FILE: ReferenceFile = ReferenceFile { json: include_str!("../reference/crossover.json"), radii: 22 };
 
 /// The reference has twelve digits, from arithmetic in double. A motion that lasts for ever is an eigenvalue 1 beside others that are not far: the claimed error is
 /// larger there.
@@ -55,7 +22,7 @@ fn compare(case: &Case, analysis: &Analysis, sharp: f64) {
 
 #[test]
 fn the_reduced_radii_are_those_of_another_program() {
-    for case in cases() {
+    for case in FILE.cases() {
         compare(&case, &analyse(&case.scene, Method::Reduced).unwrap(), 1e-6);
     }
 }
@@ -65,7 +32,7 @@ fn the_reduced_radii_are_those_of_another_program() {
 #[test]
 fn real_people_with_real_arms_find_the_same() {
     let mut compared = 0;
-    for case in cases() {
+    for case in FILE.cases() {
         let reduced = analyse(&case.scene, Method::Reduced).unwrap();
         if reduced.dimension < 300 {
             let full = analyse(&case.scene, Method::Full).unwrap();
@@ -80,25 +47,15 @@ fn real_people_with_real_arms_find_the_same() {
 /// Within 10⁻³ rad/s on either side.
 #[test]
 fn a_scene_becomes_unstable_where_another_program_says() {
-    let entries = entries("boundaries");
+    let entries = FILE.entries("boundaries");
     assert_eq!(entries.len(), 4);
-    for entry in entries {
-        let crossing: f64 = text(&entry, "crossing").parse().unwrap();
-        let verdict = |crossover: f64| {
-            let scene = parsed(&text(&entry, "scene"), &[&format!("peers.a.hand.operator.crossover={crossover}")]);
-            analyse(&scene, Method::Reduced).unwrap().verdict()
-        };
-        assert_eq!((verdict(crossing - 1e-3), verdict(crossing + 1e-3)), (Verdict::Stable, Verdict::Unstable), "{entry}");
-    }
+    entries.iter().for_each(|entry| compare_boundary(entry, "peers.a.hand.operator.crossover", 1e-3));
 }
 
 /// Equal people are one class, with the differences apart. Who is seen by another is a class alone, and all who look at that peer stay together.
 #[test]
 fn what_people_see_counts_in_what_makes_peers_equal() {
-    let parts = |name: &str| {
-        let analysis = analyse(&case(name).scene, Method::Reduced).unwrap();
-        analysis.modes[0].parts.iter().map(|part| (part.kind.word(), part.kind.peer(), part.copies)).collect::<Vec<_>>()
-    };
+    let parts = |name: &str| parts(&FILE.case(name));
     let together = ("together", None, 1);
     assert_eq!(parts("both-own"), [together, ("apart", Some(0), 1)]);
     assert_eq!(parts("four-two-own"), [together, ("apart", Some(0), 1), ("apart", Some(2), 1)]);
@@ -109,7 +66,7 @@ fn what_people_see_counts_in_what_makes_peers_equal() {
     assert_eq!(parts("three"), [together, ("apart", Some(1), 1)]);
     // Two equal peers without a person, of which the person sees the first or the second: each is a class alone. The general path knows no classes.
     for sees in ["b", "c"] {
-        let scene = parsed(&case("three").text, &[&format!("peers.a.hand.operator.sees={sees}")]);
+        let scene = parsed(&FILE.case("three").text, &[&format!("peers.a.hand.operator.sees={sees}")]);
         let (found, witness) = (analyse(&scene, Method::Reduced).unwrap(), analyse(&scene, Method::Full).unwrap());
         assert_eq!(found.modes[0].parts.iter().map(|part| part.kind.word()).collect::<Vec<_>>(), ["together"], "{sees}");
         assert!((found.radius.value - witness.radius.value).abs() < 1e-9, "{sees}: {:?} {:?}", found.radius, witness.radius);
@@ -120,13 +77,13 @@ fn what_people_see_counts_in_what_makes_peers_equal() {
 #[test]
 fn two_who_watch_one_copy_pull_against_each_other_without_end() {
     for name in ["two-see-a-third", "both-watch-one-copy"] {
-        assert_eq!(analyse(&case(name).scene, Method::Reduced).unwrap().verdict(), Verdict::Marginal, "{name}");
+        assert_eq!(analyse(&FILE.case(name).scene, Method::Reduced).unwrap().verdict(), Verdict::Marginal, "{name}");
     }
 }
 
 #[test]
 fn the_states_of_a_person_have_names() {
-    let found = monodromy(&case("within-a-frame").scene).unwrap();
+    let found = monodromy(&FILE.case("within-a-frame").scene).unwrap();
     let of_first: Vec<StateKind> = found.states.iter().filter(|state| state.peer == 0).map(|state| state.kind).collect();
     let expected = [
         StateKind::DevicePosition { axis: 0 },
@@ -148,13 +105,13 @@ const PLANE: [&str; 2] = ["scene.axes=2", "task.sines=[{ amplitude = [0.02, 0.0]
 #[test]
 fn a_person_tracks_along_each_axis_alone() {
     for name in ["own", "within-a-frame"] {
-        let case = case(name);
+        let case = FILE.case(name);
         let plane = parsed(&case.text, &PLANE);
         let (one, two) = (analyse(&case.scene, Method::Reduced).unwrap(), analyse(&plane, Method::Reduced).unwrap());
         assert_eq!((two.radius, two.dimension), (one.radius, 2 * one.dimension), "{name}");
     }
-    let full = analyse(&parsed(&case("within-a-frame").text, &PLANE), Method::Full).unwrap();
-    assert!((full.radius.value - case("within-a-frame").radius).abs() < 2e-12, "{:?}", full.radius);
+    let full = analyse(&parsed(&FILE.case("within-a-frame").text, &PLANE), Method::Full).unwrap();
+    assert!((full.radius.value - FILE.case("within-a-frame").radius).abs() < 2e-12, "{:?}", full.radius);
 }
 
 /// The keys of a person are axes of maps and lines: those that only set a number, and those that change the size of the matrix.
@@ -165,17 +122,7 @@ fn maps_and_lines_follow_the_keys_of_a_person() {
         ("peers.a.hand.operator.visual-delay=100ms..300ms", [150.0, 290.0]),
         ("peers.a.hand.operator.arm.stiffness=0..900", [0.0, 600.0]),
     ] {
-        let range = KeyRange::parse(key).unwrap();
-        let text = case("own").text;
-        let family = Family::new(&text, "own.toml".as_ref(), &[], vec![range.clone()]).unwrap();
-        let mut scratch = FamilyScratch::default();
-        for value in values {
-            let found = family.bounded_radius(&[value], &mut scratch).unwrap();
-            let scene = parsed(&text, &[&range.text(value)]);
-            let expected = analyse(&scene, Method::Reduced).unwrap().radius;
-            assert!((found.radius.value - expected.value).abs() < 1e-12, "{key} at {value}: {found:?} is not {expected:?}");
-            assert!(found.radius.error < 1e-6, "{key} at {value}: a bound of {:e} says little", found.radius.error);
-        }
+        compare_family(&FILE.case("own").text, key, values, 1e-6);
     }
 }
 
@@ -188,7 +135,7 @@ fn refused<T>(what: &str, found: Result<T, AnalysisError>) {
 
 #[test]
 fn what_does_not_follow_a_person_says_so_by_name() {
-    let scene = case("both-own").scene;
+    let scene = FILE.case("both-own").scene;
     refused("the mean square", mean_square(&scene));
     let Err(AdmittanceError::Analysis(error)) = Admittance::of(&scene, 1) else { panic!("the admittance answers") };
     refused::<()>("the admittance", Err(error));
@@ -208,12 +155,11 @@ const TURNS: [&str; 4] = [
 /// Topologies and objects that turn are refused on every way to a radius.
 #[test]
 fn neither_topologies_nor_objects_that_turn_follow_a_person() {
-    let case = case("three");
+    let case = FILE.case("three");
     for (what, overrides) in [("a graph", &["topology.kind=ring"][..]), ("the analysis of an object that turns", &TURNS)] {
         let scene = parsed(&case.text, overrides);
         refused(what, analyse(&scene, Method::Reduced));
-        let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
-        let family = Family::new(&case.text, "three.toml".as_ref(), &overrides, vec![KeyRange::parse("coordination.damping=1..10").unwrap()]);
+        let family = Family::new(&case.text, "three.toml".as_ref(), &owned(overrides), vec![KeyRange::parse("coordination.damping=1..10").unwrap()]);
         let error = family.and_then(|family| family.bounded_radius(&[5.0], &mut FamilyScratch::default())).unwrap_err().to_string();
         assert!(error.contains(&format!("{what} does not follow the operator of a, whose law is \"crossover\": ")), "{error}");
     }
@@ -228,7 +174,7 @@ fn neither_topologies_nor_objects_that_turn_follow_a_person() {
 #[test]
 fn waves_leave_the_own_copy_of_who_watches_another_where_it_is() {
     let waves = ["coordination.strategy=wave", "peers.a.hand.operator.visual-delay=3ms"];
-    let [own, other] = ["own", "sees-the-second"].map(|name| analyse(&parsed(&case(name).text, &waves), Method::Reduced).unwrap());
+    let [own, other] = ["own", "sees-the-second"].map(|name| analyse(&parsed(&FILE.case(name).text, &waves), Method::Reduced).unwrap());
     assert_eq!((own.verdict(), own.rigid_modes), (Verdict::Stable, 1));
     assert_eq!((other.verdict(), other.rigid_modes), (Verdict::Marginal, 0));
     assert!((other.radius.value - 1.0).abs() < 1e-9 && other.radius.error < 1e-9, "{:?}", other.radius);
@@ -237,15 +183,15 @@ fn waves_leave_the_own_copy_of_who_watches_another_where_it_is() {
 /// A loss leaves the verdict nominal, with the reason.
 #[test]
 fn with_chance_the_verdict_on_a_person_is_nominal() {
-    let scene = parsed(&case("own").text, &["link.loss=10%"]);
+    let scene = parsed(&FILE.case("own").text, &["link.loss=10%"]);
     let judged = judge(&scene, Method::Reduced, 1 << 20).unwrap();
-    assert!((judged.analysis.radius.value - case("own").radius).abs() < 2e-12);
+    assert!((judged.analysis.radius.value - FILE.case("own").radius).abs() < 2e-12);
     assert!(
         judged.mean_square.is_none() && judged.analysis.notes.iter().any(|note| note.contains("the mean square does not follow the operator of a"))
     );
     // A map has the second moment of equal people over equal links, or its nominal value: the square of the radius.
     let keys = vec![KeyRange::parse("coordination.damping=1..10").unwrap()];
-    let both = case("both-own");
+    let both = FILE.case("both-own");
     let family = Family::new(&both.text, "both.toml".as_ref(), &["link.loss=10%".to_owned()], keys).unwrap();
     let found = family.radius(&[5.0], &mut FamilyScratch::default()).unwrap();
     assert!(found.is_nominal && (found.radius - both.radius.powi(2)).abs() < 1e-9, "{found:?}");

@@ -1,45 +1,12 @@
 //! Devices that exchange late or not at each tick, against radii and boundaries that were computed apart from this program: see `tests/reference/README.md`.
 
-use cohaptic_scene::Scene;
 use cohaptic_stability::{
-    Analysis, Family, FamilyScratch, Graph, KeyRange, Method, StateKind, Verdict, admittance, analyse, analyse_on, judge, mean_square, monodromy,
+    Analysis, Family, FamilyScratch, Graph, KeyRange, Method, StateKind, admittance, analyse, analyse_on, judge, mean_square, monodromy,
 };
-use serde_json::Value;
 
-struct Case {
-    name: String,
-    text: String,
-    scene: Scene,
-    radius: f64,
-}
+use crate::reference_file::{Case, ReferenceFile, compare_boundary, compare_family, parsed, parts, text};
 
-fn entries(kind: &str) -> Vec<Value> {
-    let all: Value = serde_json::from_str(include_str!("../reference/exchange.json")).unwrap();
-    all[kind].as_array().unwrap().clone()
-}
-
-fn text(entry: &Value, key: &str) -> String {
-    entry[key].as_str().unwrap().to_owned()
-}
-
-fn parsed(text: &str, overrides: &[&str]) -> Scene {
-    let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
-    Scene::parse(text, "exchange.toml".as_ref(), &overrides).unwrap()
-}
-
-fn cases() -> Vec<Case> {
-    let case = |entry: &Value| {
-        let text_of = |key: &str| text(entry, key);
-        Case { name: text_of("name"), scene: parsed(&text_of("scene"), &[]), text: text_of("scene"), radius: text_of("radius").parse().unwrap() }
-    };
-    let cases: Vec<Case> = entries("radii").iter().map(case).collect();
-    assert!(cases.len() > 14, "{}", cases.len());
-    cases
-}
-
-fn case(name: &str) -> Case {
-    cases().into_iter().find(|case| case.name == name).unwrap()
-}
+const FILE: ReferenceFile = ReferenceFile { json: include_str!("../reference/exchange.json"), radii: 15 };
 
 /// The reference has twelve digits, from arithmetic in double.
 #[track_caller]
@@ -52,7 +19,7 @@ fn compare(case: &Case, analysis: &Analysis, sharp: f64) {
 
 #[test]
 fn the_reduced_radii_are_those_of_another_program() {
-    for case in cases() {
+    for case in FILE.cases() {
         compare(&case, &analyse(&case.scene, Method::Reduced).unwrap(), 1e-9);
     }
 }
@@ -60,7 +27,7 @@ fn the_reduced_radii_are_those_of_another_program() {
 /// The general path steps the simulator's own peers.
 #[test]
 fn real_peers_with_real_devices_find_the_same() {
-    for case in cases() {
+    for case in FILE.cases() {
         let reduced = analyse(&case.scene, Method::Reduced).unwrap();
         let full = analyse(&case.scene, Method::Full).unwrap();
         compare(&case, &full, 1e-6);
@@ -71,22 +38,15 @@ fn real_peers_with_real_devices_find_the_same() {
 /// Within 10⁻⁴ N/m on either side.
 #[test]
 fn a_scene_becomes_unstable_where_another_program_says() {
-    let entries = entries("boundaries");
+    let entries = FILE.entries("boundaries");
     assert_eq!(entries.len(), 16);
-    for entry in entries {
-        let crossing: f64 = text(&entry, "crossing").parse().unwrap();
-        let verdict = |stiffness: f64| {
-            let scene = parsed(&text(&entry, "scene"), &[&format!("peer.coupling.stiffness={stiffness}")]);
-            analyse(&scene, Method::Reduced).unwrap().verdict()
-        };
-        assert_eq!((verdict(crossing - 1e-4), verdict(crossing + 1e-4)), (Verdict::Stable, Verdict::Unstable), "{entry}");
-    }
+    entries.iter().for_each(|entry| compare_boundary(entry, "peer.coupling.stiffness", 1e-4));
 }
 
 /// An exchange at each tick without delay adds no state and changes no bit, also where the keys say so.
 #[test]
 fn an_exchange_at_each_tick_is_no_exchange() {
-    let case = case("two");
+    let case = FILE.case("two");
     let plain = case.text.replace("device = { exchange-every = 2, exchange-age = 0 }\n", "");
     assert_ne!(plain, case.text);
     let [plain, each] = [parsed(&plain, &[]), parsed(&case.text, &["peers.a.device.exchange-every=1", "peers.b.device.exchange-every=1"])];
@@ -100,7 +60,7 @@ fn an_exchange_at_each_tick_is_no_exchange() {
 
 #[test]
 fn the_states_of_an_exchange_have_names() {
-    let found = monodromy(&case("three-unlike").scene).unwrap();
+    let found = monodromy(&FILE.case("three-unlike").scene).unwrap();
     let of = |peer: usize| found.states.iter().filter(move |state| state.peer == peer).map(|state| state.kind).collect::<Vec<_>>();
     let reading = [StateKind::ReadingPosition { axis: 0 }, StateKind::ReadingVelocity { axis: 0 }, StateKind::KeptCoupling { axis: 0 }];
     let latest = [StateKind::LatestPosition { axis: 0 }, StateKind::LatestVelocity { axis: 0 }];
@@ -114,10 +74,7 @@ fn the_states_of_an_exchange_have_names() {
 /// Equal exchanges make equal peers, other exchanges make other classes.
 #[test]
 fn exchanges_count_in_what_makes_peers_equal() {
-    let parts = |name: &str| {
-        let analysis = analyse(&case(name).scene, Method::Reduced).unwrap();
-        analysis.modes[0].parts.iter().map(|part| (part.kind.word(), part.kind.peer(), part.copies)).collect::<Vec<_>>()
-    };
+    let parts = |name: &str| parts(&FILE.case(name));
     let together = ("together", None, 1);
     assert_eq!(parts("five-of-eight"), [together, ("apart", Some(0), 2)]);
     assert_eq!(parts("four-classes"), [together, ("apart", Some(0), 1), ("apart", Some(2), 1)]);
@@ -127,7 +84,7 @@ fn exchanges_count_in_what_makes_peers_equal() {
 /// On the complete graph each peer hears every other, as without a graph.
 #[test]
 fn a_graph_of_slow_devices_has_the_radius_of_the_scene() {
-    let case = case("five-of-eight");
+    let case = FILE.case("five-of-eight");
     let found = analyse_on(&case.scene, &Graph::Complete).unwrap();
     assert!((found.radius.value - case.radius).abs() < 1e-11, "{:?}", found.radius);
 }
@@ -136,24 +93,14 @@ fn a_graph_of_slow_devices_has_the_radius_of_the_scene() {
 #[test]
 fn maps_and_lines_follow_slow_devices() {
     for (key, values) in [("peer.coupling.stiffness=100..5000", [300.0, 4000.0]), ("peers.a.device.exchange-every=1..9", [2.0, 7.0])] {
-        let range = KeyRange::parse(key).unwrap();
-        let text = case("one-slow").text;
-        let family = Family::new(&text, "one-slow.toml".as_ref(), &[], vec![range.clone()]).unwrap();
-        let mut scratch = FamilyScratch::default();
-        for value in values {
-            let found = family.bounded_radius(&[value], &mut scratch).unwrap();
-            let scene = parsed(&text, &[&range.text(value)]);
-            let expected = analyse(&scene, Method::Reduced).unwrap().radius;
-            assert!((found.radius.value - expected.value).abs() < 1e-12, "{key} at {value}: {found:?} is not {expected:?}");
-            assert!(found.radius.error < 1e-9, "{key} at {value}: a bound of {:e} says little", found.radius.error);
-        }
+        compare_family(&FILE.case("one-slow").text, key, values, 1e-9);
     }
 }
 
 /// Pushed at each tick, also between two exchanges.
 #[test]
 fn the_admittance_is_that_of_another_program() {
-    let entries = entries("admittance");
+    let entries = FILE.entries("admittance");
     assert_eq!(entries.len(), 6);
     for entry in entries {
         let scene = parsed(&text(&entry, "scene"), &[]);
@@ -172,7 +119,7 @@ fn the_admittance_is_that_of_another_program() {
 /// The mean square does not follow slow devices: the verdict is nominal, with the reason.
 #[test]
 fn with_chance_the_verdict_on_a_slow_device_is_nominal() {
-    let case = case("two-late");
+    let case = FILE.case("two-late");
     let error = mean_square(&case.scene).unwrap_err().to_string();
     assert!(error.starts_with("the mean square does not follow the device of a, which exchanges late or not at each tick: "), "{error}");
     let scene = parsed(&case.text, &["link.loss=10%"]);

@@ -17,6 +17,7 @@ mod mean_square;
 mod random;
 mod reduction;
 mod reference;
+mod reference_file;
 mod rotation;
 mod strategies;
 mod turned_admittance;

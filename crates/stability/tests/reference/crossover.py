@@ -1,8 +1,9 @@
 """Radii of scenes in which people track a target by the law crossover, and the values of ωc at which these scenes become unstable.
 
-It shares no code with the program nor with the other files here. One frame of a scene happens to the unit vectors of its state, all at once: every quantity is
-the row of its coefficients in the state at the beginning of the frame. The eigenvalues of the resulting matrix come from LAPACK, in double, of which the printed
-twelve digits are the same wherever it runs. `python3 crossover.py` writes crossover.json in some seconds; numpy is all it needs.
+It shares no code with the program, and with the other files here only the step map of `held_force.py`, with `exchange.py`. One frame of a scene happens to the
+unit vectors of its state, all at once: every quantity is the row of its coefficients in the state at the beginning of the frame. The eigenvalues of the
+resulting matrix come from LAPACK, in double, of which the printed twelve digits are the same wherever it runs.
+`python3 crossover.py` writes crossover.json in some seconds; numpy is all it needs.
 
 The state, at the beginning of a frame (an instant that is a multiple of the update, before anything happens at it):
     for each peer, device and copy, with a compute delay the forces of its last tick, with an operator the wanted place and the places seen at its last m ticks;
@@ -19,6 +20,8 @@ import tomllib
 
 import numpy as np
 
+from held_force import step_map
+
 UPDATE = 0.008
 
 
@@ -27,18 +30,6 @@ def seconds(text):
         if text.endswith(unit):
             return float(text.removesuffix(unit)) * factor
     raise ValueError(text)
-
-
-def step_map(mass, damping, stiffness, h):
-    """Position and velocity after a time h with a held force: the exponential of the augmented plant, by a series that is scaled and squared."""
-    a = np.array([[0.0, 1.0, 0.0], [-stiffness / mass, -damping / mass, 1.0 / mass], [0.0, 0.0, 0.0]]) * (h / 1024.0)
-    term = total = np.eye(3)
-    for number in range(1, 16):
-        term = term @ a / number
-        total = total + term
-    for _ in range(10):
-        total = total @ total
-    return total[:2, :2], total[:2, 2]
 
 
 class Peer:

@@ -1,8 +1,9 @@
 """Radii of scenes whose devices exchange late or not at each tick, and the stiffness KC at which such scenes become unstable.
 
-It shares no code with the program nor with the other files here. One frame of a scene happens to the unit vectors of its state, all at once: every quantity
-is the row of its coefficients in the state at the beginning of the frame. The eigenvalues of the resulting matrix come from LAPACK, in double, of which the printed
-twelve digits are the same wherever it runs. `python3 exchange.py` writes exchange.json in some seconds; numpy is all it needs.
+It shares no code with the program, and with the other files here only the step map of `held_force.py`, with `crossover.py`. One frame of a scene happens to the
+unit vectors of its state, all at once: every quantity is the row of its coefficients in the state at the beginning of the frame. The eigenvalues of the
+resulting matrix come from LAPACK, in double, of which the printed twelve digits are the same wherever it runs.
+`python3 exchange.py` writes exchange.json in some seconds; numpy is all it needs.
 
 Peers tick together, from the beginning of the frame on, which is the least common multiple of the update and of all exchanges. The state there:
     for each peer, device and copy, and with late readings what was read at the exchange before;
@@ -21,24 +22,14 @@ import tomllib
 
 import numpy as np
 
+from held_force import step_map
+
 
 def nanoseconds(text):
     for unit, factor in (("us", 1e3), ("ms", 1e6), ("s", 1e9)):
         if text.endswith(unit) and text.removesuffix(unit).replace(".", "").isdigit():
             return round(float(text.removesuffix(unit)) * factor)
     raise ValueError(text)
-
-
-def step_map(mass, damping, stiffness, h):
-    """Position and velocity after a time h with a held force: the exponential of the augmented plant, by a series that is scaled and squared."""
-    a = np.array([[0.0, 1.0, 0.0], [-stiffness / mass, -damping / mass, 1.0 / mass], [0.0, 0.0, 0.0]]) * (h / 1024.0)
-    term = total = np.eye(3)
-    for number in range(1, 16):
-        term = term @ a / number
-        total = total + term
-    for _ in range(10):
-        total = total @ total
-    return total[:2, :2], total[:2, 2]
 
 
 class Peer:
