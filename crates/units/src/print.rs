@@ -31,6 +31,14 @@ impl fmt::Display for Instant {
 #[derive(Clone, Copy, Debug)]
 pub struct Span(pub Duration);
 
+impl Span {
+    /// Returns a measured time, cut to whole milliseconds. Finer digits of a clock differ from run to run without a meaning.
+    #[must_use]
+    pub fn measured(time: Duration) -> Self {
+        Self(Duration::from_millis(u64::try_from(time.as_millis()).unwrap_or(u64::MAX)))
+    }
+}
+
 impl fmt::Display for Span {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let nanos = self.0.as_nanos();
@@ -174,5 +182,7 @@ mod tests {
     fn spans_take_the_unit_that_reads_best() {
         let print = |nanos| format!("{}", Span(Duration::from_nanos(nanos)));
         assert_eq!([print(0), print(250_000), print(24_500_000), print(1_500_000_000), print(7)], ["0s", "250us", "24.5ms", "1.5s", "7ns"]);
+        let measured = |nanos| format!("{}", Span::measured(Duration::from_nanos(nanos)));
+        assert_eq!([measured(507_011_033), measured(61_000_999_999), measured(999_999)], ["507ms", "61s", "0s"]);
     }
 }

@@ -89,7 +89,9 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
     let lasted = Span(summary.duration);
     match summary.ending {
         Ending::Complete | Ending::Diverged(_) => line(format!("{lasted}, {}", Counted(summary.ticks, "tick"))),
-        Ending::Interrupted(_) => line(format!("ended after {lasted} of {}, {}", Span(scene.duration), Counted(summary.ticks, "tick"))),
+        Ending::Interrupted(_) => {
+            line(format!("ended after {} of {}, {}", Span::measured(summary.duration), Span(scene.duration), Counted(summary.ticks, "tick")))
+        }
     }
     diverged(summary).into_iter().for_each(|why| line(format!("DIVERGED: {why}")));
     line(format!("the run is {}", report.validity));

@@ -41,7 +41,7 @@ pub(super) fn html(arguments: &LiveArguments, path: &Path, played: &Played<'_>, 
     let ticks = Counted(summary.ticks, "tick");
     let lasted = match summary.ending {
         Ending::Complete | Ending::Diverged(_) => format!("the session lasted {lasted}, {ticks}"),
-        Ending::Interrupted(_) => format!("the session was ended after {lasted} of {}, {ticks}", Span(scene.duration)),
+        Ending::Interrupted(_) => format!("the session was ended after {} of {}, {ticks}", Span::measured(summary.duration), Span(scene.duration)),
     };
     // A session that is not valid has a warning above, with the numbers.
     let valid = if report.validity.is_valid() { ", and was on time (valid)" } else { "" };

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant as Clock};
 use cohaptic_control::Snapshot;
 use cohaptic_falcon::boot::Progress;
 use cohaptic_realtime::{LatenessSummary, Prepared, Validity, Wish};
-use cohaptic_units::print::{Counted, Span};
+use cohaptic_units::print::Counted;
 use cohaptic_units::visible_lines;
 use cohaptic_wan::{DropCause, LinkModel, LinkStats};
 
@@ -135,12 +135,6 @@ pub(crate) fn carried(stats: &LinkStats, asked: &ConfiguredDelay, beside: &[(&st
         let _ = write!(text, "; {delays}");
     }
     text
-}
-
-/// Cuts the length of a run to whole milliseconds.
-pub(crate) fn lasted(span: Duration) -> Span {
-    // Finer digits would differ from run to run without a meaning.
-    Span(Duration::from_millis(u64::try_from(span.as_millis()).unwrap_or(u64::MAX)))
 }
 
 /// Lists all counts above zero with the name of each count: `3 stranger, 1 to-itself`. Returns `None` if all counts are zero.

@@ -5,12 +5,12 @@ use std::fmt::Write as _;
 
 use cohaptic_realtime::Wish;
 use cohaptic_relay::{Form, IntakeCounts, LinkReport, PortReport, Report};
-use cohaptic_units::print::Counted;
+use cohaptic_units::print::{Counted, Span};
 use serde::Serialize;
 
 use super::setup::Setup;
 use crate::document_schema::{document, lateness};
-use crate::realtime::{ConfiguredDelay, carried, counts, lasted, late, notes};
+use crate::realtime::{ConfiguredDelay, carried, counts, late, notes};
 
 /// Returns the answer of `cohaptic relay --json`. `asked` holds the configured delays, indexed as the links of the report.
 pub(super) fn document(setup: &Setup, report: &Report, asked: &[ConfiguredDelay], is_interrupted: bool) -> impl Serialize {
@@ -118,7 +118,7 @@ pub(super) fn describe(setup: &Setup, report: &Report, asked: &[ConfiguredDelay]
     line(format!(
         "{} arrived in {}: {sent} sent on, {dropped} dropped, {held} on the way at the end",
         Counted(packets, "datagram"),
-        lasted(report.elapsed)
+        Span::measured(report.elapsed)
     ));
     line(format!("the run is {}", report.validity));
     if report.release.count() > 0 {

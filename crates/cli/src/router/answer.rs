@@ -5,13 +5,13 @@ use std::fmt::Write as _;
 use cohaptic_linkfile::router::{RouterFile, Side};
 use cohaptic_realtime::Wish;
 use cohaptic_router::{Count, LaneSnapshot, Received, Written};
-use cohaptic_units::print::Counted;
+use cohaptic_units::print::{Counted, Span};
 use serde::Serialize;
 
 use super::{Ending, RouterRun, attached, elapsed};
 use crate::document_schema::{document, lateness};
 use crate::output;
-use crate::realtime::{ConfiguredDelay, carried, counts, lasted, late, notes};
+use crate::realtime::{ConfiguredDelay, carried, counts, late, notes};
 
 /// Returns the answer of `cohaptic router --json`.
 pub(super) fn document(file: &RouterFile, ran: &RouterRun) -> impl Serialize {
@@ -82,7 +82,7 @@ pub(super) fn describe(file: &RouterFile, ran: &RouterRun) -> String {
     let mut line = |line: String| {
         let _ = writeln!(text, "  {line}");
     };
-    let (span, held) = (lasted(elapsed(report)), report.counters.held.packets);
+    let (span, held) = (Span::measured(elapsed(report)), report.counters.held.packets);
     // The failure comes first: everything below is a result only until then.
     if let Ending::Failed(error) = ending {
         line(format!("FAILED after {span}: {error}"));

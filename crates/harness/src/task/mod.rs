@@ -100,7 +100,8 @@ pub fn task_words(result: &TaskResult, scene: &Scene) -> String {
         TaskOutcome::TimedOut => format!("timed out after {after}"),
         TaskOutcome::Failed => format!("failed after {after}{}", reason.unwrap_or_default()),
         TaskOutcome::Diverged => "the run diverged".to_owned(),
-        TaskOutcome::Unfinished => format!("unfinished: the run ended {after} after the start of the task"),
+        // People and signals end a live run at any nanosecond.
+        TaskOutcome::Unfinished => format!("unfinished: the run ended {} after the start of the task", Span::measured(result.time)),
     }
 }
 

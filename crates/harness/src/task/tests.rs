@@ -5,7 +5,7 @@ use cohaptic_scene::{Scene, TaskOutcome};
 use cohaptic_units::Instant;
 
 use super::rows::OnRow;
-use super::{Event, Failure, FailureReason, Judge, Movement, Seen, TaskResult, TaskRow};
+use super::{Event, Failure, FailureReason, Judge, Movement, Seen, TaskResult, TaskRow, task_words};
 use crate::TickRow;
 use crate::rows::{StateRow, TurnRow};
 
@@ -179,6 +179,16 @@ fn the_time_ends_at_the_timeout_and_the_instant_of_the_timeout_still_counts() {
     assert_eq!(outcome(r#"kind = "reach", targets = [0.1], radius = 0.01"#, &never), (TaskOutcome::TimedOut, 10));
     assert_eq!(outcome(&task("9ms"), &never), (TaskOutcome::TimedOut, 10));
     assert_eq!(outcome(&task("10ms"), &never), (TaskOutcome::Unfinished, 10));
+}
+
+#[test]
+fn words_about_a_run_that_was_ended_have_whole_milliseconds() {
+    let scene = scene(r#"kind = "hold", target = 0.0, radius = 0.01"#);
+    let time = std::time::Duration::from_nanos(507_011_033);
+    let result = |outcome| TaskResult { outcome, at: Instant::ZERO + time, time, reached: Vec::new(), movements: Vec::new(), failure: None };
+    assert_eq!(task_words(&result(TaskOutcome::Unfinished), &scene), "unfinished: the run ended 507ms after the start of the task");
+    // The instant of an outcome is exact.
+    assert_eq!(task_words(&result(TaskOutcome::Done), &scene), "done after 507.011033ms");
 }
 
 #[test]

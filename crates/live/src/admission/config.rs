@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use cohaptic_peer::wire::SampleKind;
-use cohaptic_units::print::Counted;
+use cohaptic_units::print::{Counted, Span};
 
 use crate::place::Place;
 use crate::{EntropyError, SessionKey};
@@ -107,7 +107,7 @@ pub enum AdmissionConfigError {
         found: usize,
     },
     /// A span is zero, or too long for nanoseconds in 64 bits.
-    #[error("{name} is {found:?}; expected a time above zero and below 584 years")]
+    #[error("{name} is {}; expected a time above zero and below 584 years", Span(*found))]
     Span {
         /// Name of the span: `tick`, `update` or `stale_after`.
         name: &'static str,
