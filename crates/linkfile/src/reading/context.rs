@@ -165,8 +165,25 @@ impl<'a> Context<'a> {
 
     /// Reports a fault in the file named by `node`. A note gives the place of `node`.
     pub(super) fn fault_in_file(&self, node: &Node, diagnostic: Diagnostic) {
+        self.refused_file(node, FileError::Invalid(Box::new(diagnostic)));
+    }
+
+    /// Reports that the document in the file named by `node` was refused. The fault keeps its place in the file, and a note gives the place of `node`. A fault in
+    /// a file which that document names has two notes, the inner first.
+    pub fn refused_file(&self, node: &Node, error: FileError) {
         let note = format!("this file is named at {}, by the key {}", self.sources.describe(node.place), node.path);
-        self.faults.report(node.place, || FileError::Invalid(Box::new(Diagnostic { note: Some(note), ..diagnostic })));
+        let noted = |diagnostic: Box<Diagnostic>| {
+            let note = match &diagnostic.note {
+                Some(inner) => format!("{inner}; {note}"),
+                None => note.clone(),
+            };
+            Box::new(Diagnostic { note: Some(note), ..*diagnostic })
+        };
+        self.faults.report(node.place, || match error {
+            FileError::Invalid(diagnostic) => FileError::Invalid(noted(diagnostic)),
+            FileError::Read { path, source, place } => FileError::Read { path, source, place: place.map(noted) },
+            error @ FileError::NoFile { .. } => error,
+        });
     }
 }
 

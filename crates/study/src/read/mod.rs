@@ -224,8 +224,7 @@ fn read_scene(node: &Node, path: &Path, text: &str, context: Context<'_>) -> Opt
     let scene = match Scene::parse_live(text, path, &[]) {
         Ok(scene) => scene,
         Err(error) => {
-            // The scene's own message has its place in the scene file.
-            context.fault_at(node, format!("the scene is refused: {error}\nexpected a scene that can be run"));
+            context.refused_file(node, error);
             return None;
         }
     };

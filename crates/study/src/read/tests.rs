@@ -51,7 +51,9 @@ fn every_refusal_has_a_place_and_a_way_out() {
         ("steps = 7", "step = 7", "study.toml:31:1: questions.1.step", "did you mean \"steps\"?"),
         ("ends = [\"not at all\", \"completely\"]", "ends = [\"not at all\"]", "study.toml:30:8: questions.1.ends", "two texts"),
         ("\"consent.md\"", "\"consnet.md\"", "study.toml:13:11: study.consent", "cannot read"),
-        ("[task]\nkind = \"reach\"", "[tsak]\nkind = \"reach\"", "study.toml:5:9: study.scene", "did you mean \"task\"?"),
+        ("[task]\nkind = \"reach\"", "[tsak]\nkind = \"reach\"", "study.toml:5:9, by the key study.scene", "did you mean \"task\"?"),
+        ("mass = 0.45", "mass = -0.45", "pull.toml:8:8: object.mass", "expected"),
+        ("delay = \"0ms\"\n", "trace = \"nothing.csv\"\n", "pull.toml:29:9: link.trace", "cannot read"),
         ("kind = \"pointer\"", "kind = \"simulated\"", "study.toml:5:9: study.scene", "no pointer"),
         (
             "\"link.delay\" =",
@@ -74,6 +76,7 @@ fn every_refusal_has_a_place_and_a_way_out() {
     }
 }
 
+        assert!(!error.contains("\\n"), "{to}:\n{error}");
 #[test]
 fn a_question_without_a_name_has_its_kind_and_its_number() {
     let study = read("name = \"workload\"\n", "").unwrap_or_else(|error| panic!("{error}"));
