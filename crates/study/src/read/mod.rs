@@ -87,7 +87,8 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Study> {
     let scene = header.scene.as_ref().and_then(|(path, text)| read_scene(header.scene_node?, path, text, context));
     let conditions_node = root.get("conditions");
     let conditions = conditions::read_conditions(conditions_node, MOST_CONDITIONS, context);
-    let questions = questions::read_questions(root.get("questions"), context);
+    let questions_node = root.get("questions");
+    let questions = questions::read_questions(questions_node, context);
     let measures = root.read("analysis", |node, context| read_analysis(node, scene.as_ref(), context));
     let operator = root.table("operator", read_operator);
     root.finish();
@@ -111,6 +112,12 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Study> {
     }
     let (factors, conditions) = conditions?;
     let (scene_file, scene_text) = header.scene?;
+    let (questions, measures) = (questions?, measures?);
+    if let Some(node) = questions_node
+        && !questions::have_own_names(node, &questions, &measures, context)
+    {
+        return None;
+    }
     let study = Study {
         file: context.sources.file.to_path_buf(),
         text: context.sources.text.to_owned(),
@@ -129,8 +136,8 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Study> {
         instructions: header.instructions?,
         factors,
         conditions,
-        questions: questions?,
-        measures: measures?,
+        questions,
+        measures,
         limit: limit(&scene),
         operator: operator?,
     };

@@ -12,12 +12,28 @@ pub(super) fn read_questions(node: Option<&Node>, context: Context<'_>) -> Optio
     let read: Vec<Option<Question>> = entries.iter().enumerate().map(|(place, entry)| read_question(entry, place, context)).collect();
     let questions: Vec<Question> = read.into_iter().collect::<Option<_>>()?;
     for (place, question) in questions.iter().enumerate() {
-        if questions[..place].iter().any(|other| other.name == question.name) {
+        if questions[..place].iter().any(|other| is_same_file(&other.name, &question.name)) {
             context.fault_at(entries[place], format!("two questions have the name {}: expected a name for each", quote(&question.name)));
             return None;
         }
     }
     Some(questions)
+}
+
+/// Reports the first question with the name of an analysed measure, whose picture has the same file. Returns whether no question has such a name. `node` is the
+/// node of the questions.
+pub(super) fn have_own_names(node: &Node, questions: &[Question], measures: &[String], context: Context<'_>) -> bool {
+    let measured = questions.iter().position(|question| measures.iter().any(|measure| is_same_file(measure, &question.name)));
+    let Some(place) = measured else { return true };
+    let name = quote(&questions[place].name);
+    let entry = values::list(node, context, "entries [[questions]]").and_then(|entries| entries.get(place).copied());
+    context.fault_at(entry.unwrap_or(node), format!("the name {name} is that of an analysed measure: expected another name"));
+    false
+}
+
+/// Returns whether two names are the same in a file system that takes upper and lower case for the same.
+fn is_same_file(one: &str, other: &str) -> bool {
+    one.eq_ignore_ascii_case(other)
 }
 
 fn read_question(node: &Node, place: usize, context: Context<'_>) -> Option<Question> {
