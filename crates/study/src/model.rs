@@ -113,7 +113,7 @@ pub struct Question {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum After {
-    /// After each trial that is no practice: after a trial that is not valid, and after its repetition, too.
+    /// After each analysed trial that is valid, repetitions included.
     Trial,
     /// After the last trial of each condition.
     Condition,

@@ -61,7 +61,7 @@ pub(super) const ORDERS: Choices<Order, 3> = [
     ("williams", Order::Williams, "the rows of a Williams design, in turn"),
 ];
 pub(super) const AFTER: Choices<After, 3> = [
-    ("trial", After::Trial, "after each analysed trial"),
+    ("trial", After::Trial, "after each analysed trial that is valid"),
     ("condition", After::Condition, "after the last trial of each condition"),
     ("study", After::Study, "at the end of the session"),
 ];

@@ -305,8 +305,10 @@ impl Sequence {
         if !faults.is_empty() && !plan.practice && plan.repeats.is_none() {
             self.left.push_back(Planned { repeats: Some(plan.code.number), ..next });
         }
+        // Answers about a trial that does not count would count for nothing: the repetition is asked about.
+        let counts = !plan.practice && faults.is_empty();
         self.ended.push(EndedTrial { plan, faults });
-        if !plan.practice && self.asks(After::Trial) {
+        if counts && self.asks(After::Trial) {
             self.state = State::Questions(After::Trial);
         } else {
             self.advance();
@@ -357,8 +359,9 @@ impl Sequence {
         last.faults.push(Fault::Repeated);
         let TrialPlan { trial, practice, code, .. } = last.plan;
         self.left.push_back(Planned { trial, practice, repeats: Some(code.number) });
-        // The state `Questions(Condition)` alone treats the block as finished. In the other states the session finds the new trial in `left`.
-        if self.state == State::Questions(After::Condition) {
+        // Questions about the trial have no use any more, and those about the condition wait for the repetition. In the other states the session finds the new
+        // trial in `left`.
+        if matches!(self.state, State::Questions(After::Trial | After::Condition)) {
             self.advance();
         }
         Ok(())
