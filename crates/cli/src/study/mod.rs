@@ -85,7 +85,7 @@ fn words(folder: &StudyFolder, power: &Power) -> Result<String, Failure> {
         text.push_str(&format!("note: {warning}\n"));
     }
     let lines = |lines: Vec<String>| lines.into_iter().map(|line| format!("  {line}\n")).collect::<String>();
-    text.push_str(&format!("\nMeans of the first dry run:\n{}", lines(analysis.mean_lines(study))));
+    text.push_str(&format!("\nMeans and timeouts of the first dry run:\n{}", lines(analysis.mean_lines(study))));
     text.push_str(&format!("\nHow often the differences are found, in {}:\n{}", Counted(power.times, "dry run"), lines(power_lines(study, power))));
     Ok(text)
 }
