@@ -96,6 +96,8 @@ pub struct Condition {
     pub texts: Vec<String>,
     /// Short text for people and for the report: the values as written.
     pub label: String,
+    /// `true` if the target of the task moves, so that modelled persons follow the target by the law crossover. Otherwise the persons make movements.
+    pub tracks: bool,
 }
 
 /// A question or a group of questions on one page.
@@ -179,6 +181,8 @@ pub struct Person {
     pub reaction: Duration,
     /// Standard deviation c of the end of a movement, over its length.
     pub noise: f64,
+    /// Velocity ω of the hand over the seen error, of a person who tracks [rad/s].
+    pub crossover: f64,
 }
 
 impl Study {

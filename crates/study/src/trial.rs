@@ -1,10 +1,10 @@
 //! The scene of a trial, for people or for modelled persons.
 
-use std::fmt::Write as _;
+use std::time::Duration;
 
 use cohaptic_linkfile::FileError;
 use cohaptic_linkfile::document::key_text;
-use cohaptic_scene::{Scene, scene_text};
+use cohaptic_scene::{Scene, TaskKind, scene_text};
 
 use crate::model::{Person, Study};
 use crate::sequence::TrialPlan;
@@ -38,7 +38,7 @@ impl Study {
     /// [`FileError`] if the scene is refused with these values. [`Study::read`] has read each condition, so this happens only for modelled persons whose
     /// numbers are out of range.
     pub fn trial_scene(&self, plan: &TrialPlan, players: Players<'_>) -> Result<TrialScene, FileError> {
-        let overrides = [format!("scene.seed={}", plan.seed)].into_iter().chain(self.players(players));
+        let overrides = [format!("scene.seed={}", plan.seed)].into_iter().chain(self.players(plan.condition, players));
         self.scene_with(plan.condition, overrides)
     }
 
@@ -64,19 +64,30 @@ impl Study {
         Ok(TrialScene { text, scene, hands })
     }
 
+    /// Returns whether the target of a condition moves; `None` for a condition whose scene is refused.
+    pub(crate) fn tracks(&self, condition: usize) -> Option<bool> {
+        let task = self.condition_scene(condition).ok()?.scene.task;
+        Some(task.is_some_and(|task| matches!(task.kind, TaskKind::Track(_))))
+    }
+
     /// Returns the overrides that put persons at the hands.
-    fn players(&self, players: Players<'_>) -> Vec<String> {
+    fn players(&self, condition: usize, players: Players<'_>) -> Vec<String> {
         let Players::Modelled(persons) = players else { return Vec::new() };
+        let tracks = self.conditions[condition].tracks;
         let mut overrides = Vec::new();
         for (name, person) in self.hands.iter().zip(persons) {
             let peer = format!("peers.{}", key_text(name));
-            let Person { movement, visual_delay, reaction, noise } = person;
-            let mut keys = String::new();
-            for (key, duration) in [("move", movement), ("visual-delay", visual_delay), ("reaction", reaction)] {
-                write!(keys, "{key} = \"{}ns\", ", duration.as_nanos()).expect("writing to memory does not fail");
-            }
+            let Person { movement, visual_delay, reaction, noise, crossover } = person;
+            let nanos = |duration: &Duration| format!("\"{}ns\"", duration.as_nanos());
+            let (movement, visual_delay, reaction) = (nanos(movement), nanos(visual_delay), nanos(reaction));
+            // A scene refuses keys of the other law.
+            let keys = if tracks {
+                format!("visual-delay = {visual_delay}, crossover = {crossover:?}")
+            } else {
+                format!("move = {movement}, visual-delay = {visual_delay}, reaction = {reaction}, noise = {noise:?}")
+            };
             overrides.push(format!("{peer}.kind=simulated"));
-            overrides.push(format!("{peer}.hand={{ operator = {{ {keys}noise = {noise:?} }} }}"));
+            overrides.push(format!("{peer}.hand={{ operator = {{ {keys} }} }}"));
         }
         overrides
     }
@@ -84,15 +95,14 @@ impl Study {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use cohaptic_peer::Hand;
+    use cohaptic_peer::operator::OperatorLaw;
     use cohaptic_scene::{PeerKind, TaskEnd};
 
     use super::*;
     use crate::codes::GroupCode;
     use crate::sequence::{Sequence, Step};
-    use crate::testing::study;
+    use crate::testing::{study, track_study};
 
     #[test]
     fn a_trial_has_the_values_of_its_condition_its_seed_and_its_players() {
@@ -112,5 +122,19 @@ mod tests {
         assert!(matches!(modelled.scene.peers[0].hand, Some(Hand::Operator { .. })));
         // The text alone is the scene.
         assert_eq!(Scene::parse(&modelled.text, &study.scene_file, &[]).unwrap(), modelled.scene);
+    }
+
+    #[test]
+    fn persons_who_track_have_a_visual_delay_and_a_crossover_frequency() {
+        let folder = tempfile::tempdir().unwrap();
+        let study = track_study(folder.path());
+        let session = Sequence::new(&study, GroupCode::of_index(0), 0);
+        let Step::Trial(plan) = session.step() else { unreachable!() };
+        let quick = Person { visual_delay: Duration::from_millis(150), crossover: 2.5, ..study.operator };
+        let trial = study.trial_scene(&plan, Players::Modelled(&[quick, study.operator])).unwrap_or_else(|error| panic!("{error}"));
+        for (peer, visual_delay, frequency) in [(0, 150, 2.5), (1, 200, 2.0)] {
+            let operator = trial.scene.operator(peer).unwrap();
+            assert_eq!((operator.visual_delay, &operator.law), (Duration::from_millis(visual_delay), &OperatorLaw::Crossover { frequency }));
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! Dry runs: modelled persons play a study, through the same sessions, folder and tables as people.
 //!
-//! The duration of movements T, the visual delay τ and the noise c of a person are the values of the study times e^(0.15·z), with an independent normal z for
-//! each value of each person. Two thirds of these values lie within ±16 % of the mean, and nearly all within ±36 %. Answers to questions are drawn evenly from
-//! the possible answers, so that the answers say nothing about the conditions.
+//! The duration of movements T, the visual delay τ and the noise c of a person, or with a moving target the visual delay τ and the crossover frequency ω, are
+//! the values of the study times e^(0.15·z), with an independent normal z for each value of each person. Two thirds of these values lie within ±16 % of the
+//! mean, and nearly all within ±36 %. Answers to questions are drawn evenly from the possible answers, so that the answers say nothing about the conditions.
 
 mod power;
 #[cfg(test)]
@@ -16,7 +16,7 @@ use cohaptic_harness::record::InputRecorder;
 use cohaptic_scene::scene_content_of_text;
 use cohaptic_wan::random::{Purpose, Stream};
 
-use crate::codes::PersonCode;
+use crate::codes::{GroupCode, PersonCode};
 use crate::error::StudyError;
 use crate::folder::{StudyFolder, TrialFacts};
 use crate::model::{Person, QuestionKind, Study};
@@ -25,7 +25,7 @@ use crate::trial::Players;
 
 pub use power::{DifferencePower, Power, power_lines};
 
-/// Standard deviation of the logarithm of T, τ and c over persons.
+/// Standard deviation of the logarithm of T, τ, c and ω over persons.
 const SPREAD: f64 = 0.15;
 
 /// An observer of a dry run, which can also stop it. The methods are called from several threads.
@@ -69,8 +69,14 @@ impl Study {
             libm::exp(SPREAD * libm::sqrt(-2.0 * libm::log1p(-radius)) * libm::cos(core::f64::consts::TAU * angle))
         };
         let times = |duration: Duration, factor: f64| duration.mul_f64(factor);
-        let Person { movement, visual_delay, reaction, noise } = self.operator;
-        Person { movement: times(movement, factor(0)), visual_delay: times(visual_delay, factor(1)), reaction, noise: noise * factor(2) }
+        let Person { movement, visual_delay, reaction, noise, crossover } = self.operator;
+        Person {
+            movement: times(movement, factor(0)),
+            visual_delay: times(visual_delay, factor(1)),
+            reaction,
+            noise: noise * factor(2),
+            crossover: crossover * factor(3),
+        }
     }
 
     /// Returns the persons of a session, indexed by seat.
@@ -84,8 +90,14 @@ impl StudyFolder {
     ///
     /// # Errors
     ///
-    /// Errors of [`StudyFolder::open`].
+    /// Errors of [`StudyFolder::open`], and a refusal of a person's numbers in the first trial of the person's group. The folder is not made then.
     pub fn open_dry(study: Study, path: &Path, program: &str) -> Result<Self, StudyError> {
+        for slot in 0..study.groups {
+            let session = Sequence::new(&study, GroupCode::of_index(slot), slot);
+            if let Step::Trial(plan) = session.step() {
+                study.trial_scene(&plan, Players::Modelled(&study.persons_of(&session)))?;
+            }
+        }
         Self::begin(study, path, program, true)
     }
 

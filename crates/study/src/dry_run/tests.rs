@@ -4,10 +4,9 @@ use std::fs;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::*;
-use crate::codes::GroupCode;
 use crate::model::{Order, QuestionKind};
 use crate::statistics::effect;
-use crate::testing::study;
+use crate::testing::{study, track_study};
 
 /// A study of two groups, with short trials.
 fn short() -> Study {
@@ -57,6 +56,7 @@ fn persons_spread_around_the_study_and_keep_their_numbers() {
         persons.iter().map(|person| person.movement.as_secs_f64() / 0.25).collect::<Vec<f64>>(),
         persons.iter().map(|person| person.visual_delay.as_secs_f64() / 0.2).collect(),
         persons.iter().map(|person| person.noise / 0.1).collect(),
+        persons.iter().map(|person| person.crossover / 3.0).collect(),
     ] {
         let logs: Vec<f64> = factors.into_iter().map(f64::ln).collect();
         let mean = logs.iter().sum::<f64>() / 400.0;
@@ -148,4 +148,29 @@ fn a_longer_delay_is_found_and_the_kept_runs_are_the_same_again() {
     let lines = power_lines(&study, &power);
     assert_eq!(lines.len(), 3);
     assert!(lines[1].starts_with("task_time_s  "), "{lines:?}");
+}
+
+#[test]
+fn a_study_of_a_moving_target_has_a_dry_run() {
+    let (files, out) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let study = track_study(files.path());
+    let mut folder = StudyFolder::open_dry(study.clone(), out.path(), "a test").unwrap();
+    assert!(folder.play_dry(&NoWatch).unwrap());
+    let analysis = folder.analysis().unwrap();
+    assert_eq!((analysis.units, analysis.measures[0].name.as_str(), analysis.measures[0].rows.len()), (2, "peers.left.error_rms_m", 2));
+    // Who sees the target 100 ms later follows less exactly than who sees the target at once, and nobody stays away from the target.
+    assert!(analysis.measures[0].means.iter().all(|mean| (1e-4..0.014).contains(&mean.mean)), "{:?}", analysis.measures[0].means);
+    assert!(folder.verify().unwrap().differences.is_empty());
+    assert_eq!(folder.power(2, &NoWatch).unwrap().unwrap().times, 2);
+}
+
+#[test]
+fn a_person_whose_numbers_are_refused_leaves_no_folder() {
+    let study = study();
+    let out = tempfile::tempdir().unwrap();
+    let path = out.path().join("dry");
+    let study = Study { operator: Person { visual_delay: Duration::from_secs(100), ..study.operator }, ..study };
+    let refused = StudyFolder::open_dry(study, &path, "a test").unwrap_err().to_string();
+    assert!(refused.contains("operator.visual-delay") && refused.contains("expected"), "{refused}");
+    assert!(!path.exists());
 }

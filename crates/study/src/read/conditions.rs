@@ -9,7 +9,10 @@ use crate::model::{Condition, Factor};
 /// Reads the factors and their product. Without the table there is one condition, the scene as written.
 pub(super) fn read_conditions(node: Option<&Node>, most: usize, context: Context<'_>) -> Option<(Vec<Factor>, Vec<Condition>)> {
     let Some(node) = node else {
-        return Some((Vec::new(), vec![Condition { overrides: Vec::new(), values: Vec::new(), texts: Vec::new(), label: "scene".to_owned() }]));
+        return Some((
+            Vec::new(),
+            vec![Condition { overrides: Vec::new(), values: Vec::new(), texts: Vec::new(), label: "scene".to_owned(), tracks: false }],
+        ));
     };
     let Some(table) = node.as_table() else {
         context.fault_at(node, format!("found {}: expected a table such as {{ \"link.delay\" = [\"0ms\", \"100ms\"] }}", node.describe()));
@@ -81,5 +84,7 @@ fn of_places(places: &[usize], factors: &[Variation]) -> Condition {
         values: chosen().map(|(place, factor)| factor.value(*place)).collect(),
         label: texts.join(", "),
         texts,
+        // Known as soon as the scene of the condition is read.
+        tracks: false,
     }
 }

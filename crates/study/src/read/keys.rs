@@ -54,6 +54,7 @@ pub(super) static OPERATOR: Table = Table::of(&[&[
     usual("visual-delay", Form::PositiveDuration, "\"200ms\"", "Time from an image to its use by the person"),
     usual("reaction", Form::Duration, "\"250ms\"", "Time until the first movement"),
     usual("noise", number(Quantity::not_negative("")), "0.1", "Standard deviation of the end of a movement, over the length of the movement"),
+    usual("crossover", number(Quantity::positive("rad/s")), "3", "Velocity of the hand over the seen error, of a person who tracks"),
 ]]);
 pub(super) const ORDERS: Choices<Order, 3> = [
     ("given", Order::Given, "the order of the file, for every group"),

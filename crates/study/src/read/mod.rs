@@ -2,6 +2,7 @@
 
 mod conditions;
 mod keys;
+mod operator;
 mod questions;
 
 use std::collections::BTreeMap;
@@ -13,11 +14,11 @@ use cohaptic_linkfile::document::{Node, Sources, quote};
 use cohaptic_linkfile::reading::named_file::{file_path, read_file};
 use cohaptic_linkfile::reading::{Context, FileReader, TableReader, default_title, one_of, parse_with, values, with_text};
 use cohaptic_scene::{Measure, MeasureName, PeerKind, Scene, Scope, scene_content_of_text};
-use cohaptic_units::print::Counted;
+use cohaptic_units::print::{Counted, Span};
 
-use crate::model::{Breaks, Order, Person, Study};
+use crate::model::{Breaks, Order, Study};
 use crate::trial::TrialScene;
-use keys::{ANALYSIS, BREAK, OPERATOR, ORDERS, STUDY};
+use keys::{ANALYSIS, BREAK, ORDERS, STUDY};
 
 pub use keys::ROOT;
 
@@ -90,7 +91,8 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Study> {
     let questions_node = root.get("questions");
     let questions = questions::read_questions(questions_node, context);
     let measures = root.read("analysis", |node, context| read_analysis(node, scene.as_ref(), context));
-    let operator = root.table("operator", read_operator);
+    let operator_node = root.get("operator");
+    let operator = root.table("operator", operator::read_operator);
     root.finish();
     // From here on `?` ends the reading without a new fault: each `None` was reported where the value was read.
     let (group, participants) = (header.group?, header.participants?);
@@ -118,7 +120,7 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Study> {
     {
         return None;
     }
-    let study = Study {
+    let mut study = Study {
         file: context.sources.file.to_path_buf(),
         text: context.sources.text.to_owned(),
         files: header.files,
@@ -141,10 +143,21 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Study> {
         limit: limit(&scene),
         operator: operator?,
     };
+    let tracks: Vec<Option<bool>> = (0..study.conditions.len()).map(|condition| study.tracks(condition)).collect();
+    for (condition, tracks) in study.conditions.iter_mut().zip(&tracks) {
+        condition.tracks = tracks.unwrap_or(false);
+    }
     if let Some(node) = conditions_node
         && let Some(message) = unfit_condition(&study)
     {
         context.fault_at(node, message);
+        return None;
+    }
+    // A refused scene has a message of its own, and its task is not known.
+    if let Some(node) = operator_node
+        && tracks.iter().all(Option::is_some)
+        && !operator::is_used(&study, node, context)
+    {
         return None;
     }
     Some(study)
@@ -158,8 +171,9 @@ fn unfit_condition(study: &Study) -> Option<String> {
             (hands(&scene) != study.hands).then(|| format!("the pointers are {}: expected {}", hands(&scene).join(", "), study.hands.join(", ")))
         });
         let other_limit = || {
-            let message =
-                || format!("a task may take {:?}, and {:?} in the scene: expected the same time in all conditions", limit(&scene), study.limit);
+            let message = || {
+                format!("a task may take {}, and {} in the scene: expected the same time in all conditions", Span(limit(&scene)), Span(study.limit))
+            };
             (limit(&scene) != study.limit).then(message)
         };
         unfit.or_else(other_limit).map(|message| format!("in the condition {}, {message}", quote(&condition.label)))
@@ -298,14 +312,6 @@ fn read_measure(node: &Node, scene: Option<&Scene>, context: Context<'_>) -> Opt
         return None;
     }
     Some(name.to_owned())
-}
-
-fn read_operator(node: &Node, context: Context<'_>) -> Option<Person> {
-    let mut table = TableReader::new(node, context, &OPERATOR, "a table such as { move = \"250ms\", noise = 0.1 }")?;
-    let (movement, visual_delay) = (table.value("move"), table.value("visual-delay"));
-    let (reaction, noise) = (table.value("reaction"), table.value("noise"));
-    table.finish();
-    Some(Person { movement: movement?, visual_delay: visual_delay?, reaction: reaction?, noise: noise? })
 }
 
 #[cfg(test)]

@@ -52,6 +52,7 @@ fn every_refusal_has_a_place_and_a_way_out() {
         ("ends = [\"not at all\", \"completely\"]", "ends = [\"not at all\"]", "study.toml:30:8: questions.1.ends", "two texts"),
         ("\"together\"", "\"task_time_s\"", "study.toml:25:1: questions.1", "that of an analysed measure"),
         ("\"together\"", "\"TLX1\"", "study.toml:25:1: questions.1", "two questions have the name"),
+        ("[analysis]", "[operator]\ncrossover = 2\n[analysis]", "study.toml:34:13: operator.crossover", "no condition has a task of kind track"),
         ("\"consent.md\"", "\"consnet.md\"", "study.toml:13:11: study.consent", "cannot read"),
         ("[task]\nkind = \"reach\"", "[tsak]\nkind = \"reach\"", "study.toml:5:9, by the key study.scene", "did you mean \"task\"?"),
         ("mass = 0.45", "mass = -0.45", "pull.toml:8:8: object.mass", "expected"),
@@ -75,10 +76,10 @@ fn every_refusal_has_a_place_and_a_way_out() {
         let error = read(from, to).expect_err(to);
         assert!(error.contains(place) && error.contains(words), "{to}:\n{error}");
         assert!(error.contains("expected"), "{to}:\n{error}");
+        assert!(!error.contains("\\n"), "{to}:\n{error}");
     }
 }
 
-        assert!(!error.contains("\\n"), "{to}:\n{error}");
 #[test]
 fn a_question_without_a_name_has_its_kind_and_its_number() {
     let study = read("name = \"workload\"\n", "").unwrap_or_else(|error| panic!("{error}"));
