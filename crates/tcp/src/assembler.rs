@@ -29,9 +29,9 @@ pub(crate) struct Assembler {
     segments: VecDeque<Held>,
     /// Memory of `segments` \[byte\].
     ready_memory: usize,
-    /// Number of pieces that came into `ready` since the program last read everything, or since the queue was empty.
-    come: usize,
-    /// Value of `come` when the memory of the queues was last released.
+    /// Greatest length of `ready` since the program last read everything.
+    longest: usize,
+    /// Value of `longest` when the memory of the queues was last released.
     expected: usize,
     /// Positions of the octets in `pieces`, with neighbouring pieces joined to one range.
     ranges: Ranges,
@@ -91,7 +91,7 @@ impl Assembler {
     fn hold(&mut self, data: Bytes) {
         let octets = data.len();
         if self.ready.capacity() == 0 {
-            // The next flight mostly has as many segments as the last one or twice as many, and growing piece by piece would copy the queues each time.
+            // The next flight mostly has as many segments as the last flight or twice as many, and growing piece by piece would copy the queues each time.
             self.ready.reserve(self.expected);
             self.segments.reserve(self.expected);
         }
@@ -104,8 +104,8 @@ impl Assembler {
         }
         if octets > 0 {
             self.unread += octets;
-            self.come += 1;
             self.ready.push_back(data);
+            self.longest = self.longest.max(self.ready.len());
         }
     }
 
@@ -210,10 +210,10 @@ impl Assembler {
             }
         }
         if self.unread == 0 {
-            let come = core::mem::take(&mut self.come);
+            let longest = core::mem::take(&mut self.longest);
             // An empty queue keeps its capacity, and an idle connection is to be small.
             if self.ready.capacity().max(self.segments.capacity()) > KEPT {
-                (self.ready, self.segments, self.expected) = (VecDeque::new(), VecDeque::new(), come);
+                (self.ready, self.segments, self.expected) = (VecDeque::new(), VecDeque::new(), longest);
             }
         }
         count

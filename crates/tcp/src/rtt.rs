@@ -129,4 +129,16 @@ mod tests {
         round_trips.backoff = 40;
         assert_eq!(round_trips.timeout(), Duration::from_secs(120));
     }
+
+    /// Also the timeout without doublings lies within the bounds, with and without samples.
+    #[test]
+    fn no_timeout_is_beyond_the_bounds() {
+        let config = TcpConfig { least_timeout: Duration::from_millis(300), greatest_timeout: Duration::from_secs(2), ..TcpConfig::default() };
+        for (span, timeout) in [(Duration::from_millis(1), config.least_timeout), (Duration::from_secs(3), config.greatest_timeout)] {
+            let mut round_trips = RoundTrips::new(&TcpConfig { initial_timeout: span, ..config.clone() });
+            assert_eq!((round_trips.base_timeout(), round_trips.timeout()), (nanos(timeout), timeout));
+            round_trips.sample(Instant::ZERO, span);
+            assert_eq!((round_trips.base_timeout(), round_trips.timeout()), (nanos(timeout), timeout));
+        }
+    }
 }

@@ -51,6 +51,33 @@ fn memory_is_free_when_the_last_octet_of_a_segment_is_read() {
     assert_eq!(assembler.memory(), 1664);
 }
 
+/// The queues begin with the room that the last flight has needed. A reader that is always behind has no longer queue in a longer transfer.
+#[test]
+fn the_room_for_a_flight_is_that_of_the_queue_and_not_of_the_transfer() {
+    let (mut assembler, mut next) = (Assembler::default(), 0);
+    let mut insert = |assembler: &mut Assembler, pieces: usize| {
+        for _ in 0..pieces {
+            let at = next;
+            assembler.insert(&mut next, at, Bytes::from_static(&[0; 1448]));
+        }
+    };
+    insert(&mut assembler, 100);
+    for _ in 0..10_000 {
+        assembler.read(&mut [0; 1448]);
+        insert(&mut assembler, 1);
+    }
+    let read_all = |assembler: &mut Assembler| {
+        assembler.read(&mut vec![0; assembler.unread()]);
+        [assembler.ready.capacity(), assembler.segments.capacity()]
+    };
+    assert_eq!(read_all(&mut assembler), [0, 0]);
+    for (pieces, room) in [(1, 100..200), (20, 1..100)] {
+        insert(&mut assembler, pieces);
+        assert!([assembler.ready.capacity(), assembler.segments.capacity()].iter().all(|capacity| room.contains(capacity)), "{pieces}");
+        read_all(&mut assembler);
+    }
+}
+
 #[test]
 fn the_block_that_changed_last_comes_first() {
     let (mut assembler, mut next) = (Assembler::default(), 0);

@@ -40,7 +40,7 @@ impl Connection {
             (one, other) => one.or(other),
         };
         let timer = self.timer.map(|(at, _)| at);
-        // Every segment asks for the deadline, so that the four are compared one by one, without an iterator.
+        // Every segment asks for the deadline, so that the four deadlines are compared one by one, without an iterator.
         earlier(earlier(timer, self.receive.ack_at), earlier(self.keepalive_at, self.linger_until))
     }
 

@@ -96,6 +96,14 @@ fn the_segment_after_a_reduction_has_cwr() {
             a.handle_segment(millis(60), &answer);
         }
     }
+    // An acknowledgement without data tells nothing (RFC 3168, section 6.1.5).
+    b.write(&[7; 1448 * 2]).unwrap();
+    while let Some(data) = b.poll_transmit(millis(60)) {
+        a.handle_segment(millis(65), &data);
+    }
+    let answers: Vec<_> =
+        std::iter::from_fn(|| a.poll_transmit(millis(65))).map(|answer| (answer.payload.len(), answer.flags.has(Flags::CWR))).collect();
+    assert_eq!(answers, [(0, false)]);
     a.write(&[7; 1448 * 3]).unwrap();
     let told: Vec<bool> = std::iter::from_fn(|| a.poll_transmit(millis(70))).map(|segment| segment.flags.has(Flags::CWR)).collect();
     assert_eq!(told, [true, false, false]);

@@ -10,6 +10,7 @@
 mod buffers;
 mod dctcp;
 mod dualpi2;
+mod flags;
 mod fuzz;
 mod recovery;
 mod rows;
