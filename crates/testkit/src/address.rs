@@ -247,7 +247,6 @@ impl AddressPlan {
     }
 
     /// Returns whether the address with the short form `short` is an address of the host, loopback included.
-    #[cfg(feature = "tcp")]
     #[inline]
     pub(crate) fn is_own(&self, host: NodeId, short: u32, is_six: bool) -> bool {
         self.short(host, is_six) == short || Addresses::is_loopback(short, is_six)
@@ -296,6 +295,22 @@ mod tests {
             ("fd01::1", None),
         ] {
             assert_eq!(owner(&plan, address).as_deref(), host, "{address}");
+        }
+        // Addresses of different versions may have one short form: 127.0.0.1 and `fd00::7500:1`, `::1` and 10.0.0.0.
+        for (address, is_own) in [
+            ("10.0.0.2", true),
+            ("fd00::1", true),
+            ("10.0.0.1", false),
+            ("127.0.0.1", true),
+            ("127.9.9.9", true),
+            ("fd00::7500:1", false),
+            ("::1", true),
+            ("10.0.0.0", false),
+            ("fd00::", false),
+            ("::ffff:10.0.0.2", false),
+        ] {
+            let ip: IpAddr = address.parse().unwrap();
+            assert_eq!(plan.is_own(NodeId::new(0), Addresses::short(ip), ip.is_ipv6()), is_own, "{address}");
         }
         let moved = plan.change(NodeId::new(2));
         assert_eq!((moved.v4.to_string(), moved.v6.to_string()), ("10.0.0.6".into(), "fd00::6".into()));

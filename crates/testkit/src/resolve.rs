@@ -31,7 +31,7 @@ pub trait ToSocketAddrs {
         self.to_socket_addrs()?.first().copied().ok_or_else(none)
     }
 
-    /// Returns the socket address if `self` is one, and `None` for every other description. Sending a datagram then needs no copy of the address.
+    /// Returns the socket address if `self` is a socket address, and `None` for every other description. Sending a datagram then needs no copy of the address.
     fn as_socket_addr(&self) -> Option<&SocketAddr> {
         None
     }

@@ -114,7 +114,7 @@ impl Reader {
                 let whole = subject[0].start..subject[2].end;
                 let link = link(line, &rest, file)?;
                 let is_known =
-                    // Both directions of `<->` are inserted, and either of them may be given twice.
+                    // Both directions of `<->` are inserted, and either direction may be given twice.
                     self.links.insert(pair, link.clone()).is_some() || arrow == "<->" && self.links.insert((pair.1, pair.0), link).is_some();
                 if is_known { Err(twice(&whole, "this link")) } else { Ok(()) }
             }

@@ -312,8 +312,7 @@ impl Core {
         Err(self.lose(path, &parcel))
     }
 
-    /// Returns the socket of `host` for the packet. A socket connected to the sender comes before an unconnected socket, then a socket bound to the address
-    /// before a socket bound to all addresses, then the socket bound last. The only socket of a port is returned unseen: the caller asks whether the socket
+    /// Returns the socket of `host` for the packet. The only socket of a port is returned unseen: the caller asks whether the socket
     /// [hears](SocketState::hears) the packet.
     #[inline(always)]
     fn socket_for(&self, host: NodeId, ends: &Ends) -> Option<SocketId> {
@@ -324,9 +323,8 @@ impl Core {
         if bound.others.is_empty() {
             return Some(bound.first);
         }
-        let rank = |id: &SocketId| (self.sockets.get(*id).peer.is_some(), self.sockets.get(*id).at.is_some());
-        // The sockets have the order of binding, and of equal ranks `max_by_key` returns the last.
-        bound.all().filter(|id| self.sockets.get(*id).hears(ends)).max_by_key(rank)
+        // Several sockets of a port are bound to different addresses, so at most one socket hears the packet.
+        bound.all().find(|id| self.sockets.get(*id).hears(ends))
     }
 
     /// Returns whether `host` has the address to which the packet goes.

@@ -83,7 +83,7 @@ impl Core {
 
     /// Checks that a socket of `host` can be bound to the address `ip`.
     pub(super) fn check_owned(&self, host: NodeId, ip: IpAddr) -> io::Result<()> {
-        if ip.is_unspecified() || ip.is_loopback() || self.plan.of(host).has(ip) { Ok(()) } else { Errno::AddrNotAvailable.fail() }
+        if ip.is_unspecified() || self.plan.is_own(host, Addresses::short(ip), ip.is_ipv6()) { Ok(()) } else { Errno::AddrNotAvailable.fail() }
     }
 
     fn is_taken(&self, host: NodeId, ip: IpAddr, port: u16) -> bool {

@@ -140,8 +140,8 @@ impl Woken {
     }
 }
 
-/// Wakers to call, now that the borrow of the state has ended. Boxed by [`Woken::take`], because nearly every question to the state passes nothing on, and a
-/// pointer of nothing stays in a register.
+/// Wakers to call, now that the borrow of the state has ended. Boxed by [`Woken::take`], because nearly every access to the state wakes no foreign task, and
+/// an absent box is a null pointer in a register.
 pub(super) struct ToWake(Vec<Waker>);
 
 impl ToWake {

@@ -203,7 +203,7 @@ impl Deref for Executor {
 impl Drop for Inner {
     fn drop(&mut self) {
         HERE.with(|here| {
-            // A later executor may have taken the place of this one.
+            // A later executor may have taken the place of this executor.
             if here.executor.get() == self.number {
                 here.executor.set(0);
                 here.waits.set(false);

@@ -9,8 +9,8 @@ pub(crate) const BYTE_LIMIT: u64 = 1 << 30;
 /// as packets. Hence packets without content count as well.
 pub(crate) const PACKET_COST: u64 = 200;
 
-/// Bytes that a run holds: sent, and neither read nor lost. A packet is added when it enters its link, and removed when it is read or lost. In between, on the
-/// links and in the buffers of sockets and nodes, nothing is counted: the parts are needed for the message of a failure only.
+/// Bytes that a run holds: sent, and neither read nor lost. A packet is added on entering its link, or its own host over loopback, and removed after being
+/// read or lost. In between, on the links and in the buffers of sockets and nodes, nothing is counted: only the message of a failure needs the parts.
 #[derive(Debug)]
 pub(crate) struct Held {
     total: u64,

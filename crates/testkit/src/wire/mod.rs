@@ -102,7 +102,7 @@ impl<A: Clone> Wire<A> {
         self.now
     }
 
-    /// Returns whether packets are hit by laws, recorded, or stopped by cuts. Otherwise no arriving packet is cut, and the ends of packets are not recorded.
+    /// Returns whether packets are hit by laws, recorded, or stopped by cuts. If not, no arriving packet is cut, and the ends of packets are not recorded.
     #[inline]
     pub(crate) const fn is_watched(&self) -> bool {
         self.is_watched

@@ -56,7 +56,7 @@ impl<A> Parcel<A> {
 /// Content of a packet.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Octets {
-    /// Number of octets. Kept beside the content, because each datagram asks for its length at seven places, and the answer depends on the kind of the content.
+    /// Number of octets. Kept beside the content, because the length of each datagram is asked for many times, and the answer depends on the kind of the content.
     len: usize,
     content: Content,
 }

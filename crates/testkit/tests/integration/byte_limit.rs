@@ -139,6 +139,45 @@ fn a_node_that_floods_is_named() {
     }
 }
 
+/// Node that sends a packet to the first node each millisecond.
+struct Ticks {
+    next: Instant,
+    is_due: bool,
+}
+
+impl Node for Ticks {
+    fn handle_packet(&mut self, _now: Instant, _packet: Packet) {}
+
+    fn poll_transmit(&mut self, _now: Instant) -> Option<Transmit> {
+        std::mem::take(&mut self.is_due).then(|| Transmit::to(0, vec![0; 1000]))
+    }
+
+    fn poll_timeout(&mut self) -> Option<Instant> {
+        Some(self.next)
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        (self.next, self.is_due) = (now + Duration::from_millis(1), true);
+    }
+}
+
+#[test]
+fn packets_for_a_node_that_is_down_or_cut_off_count_no_more() {
+    let nodes = Nodes::new().add("quiet", Quiet).add("ticks", Ticks { next: Instant::ZERO, is_due: false }).byte_limit(20_000);
+    let mut run = nodes.links("delay 5ms").start();
+    let _: Quiet = run.crash("quiet");
+    run.run_until(Instant::from_nanos(100_000_000));
+    run.restart("quiet", Quiet);
+    for turn in 11..30 {
+        run.cut("ticks", "quiet");
+        run.run_until(Instant::from_nanos(turn * 10_000_000 - 5_000_000));
+        run.mend("ticks", "quiet");
+        run.run_until(Instant::from_nanos(turn * 10_000_000));
+    }
+    let lost = run.counts("quiet").while_down + run.counts("ticks").cut;
+    assert!(lost > 150, "{lost} packets were lost");
+}
+
 /// Fifty times as many bytes as the limit pass over links that lose, copy, damage and hold packets; some sockets are closed and hosts crash with packets unread.
 #[test]
 fn what_was_read_or_lost_counts_no_more() {
@@ -152,7 +191,7 @@ fn what_was_read_or_lost_counts_no_more() {
         "delay 1ms loss 50% ecn",
         "loss 100%",
     ];
-    // Into the smaller buffer one datagram fits, and others are lost there.
+    // The smaller buffer has room for one datagram, and further datagrams are lost there.
     for (link, room) in words.into_iter().flat_map(|link| [(link, 1 << 20), (link, 2500)]) {
         Testbed::new(["a", "b"])
             .links(link)
@@ -165,7 +204,17 @@ fn what_was_read_or_lost_counts_no_more() {
                 let mut server = bed.host("b").bind("0.0.0.0:7").unwrap();
                 for turn in 0..1000 {
                     client.send_to(&[0; 800], "b:7").await.unwrap();
+                    // No socket is bound to this port, and the host sends an answer.
+                    client.send_to(&[0; 8], "b:9").await.unwrap();
+                    // A cut loses the packets under way at the far end of the link.
+                    let is_cut = turn % 10 == 5;
+                    if is_cut {
+                        bed.cut("a", "b");
+                    }
                     time::sleep(Duration::from_millis(100)).await;
+                    if is_cut {
+                        bed.mend_all();
+                    }
                     match turn % 100 {
                         97 => {
                             drop(server);

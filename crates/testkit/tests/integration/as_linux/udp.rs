@@ -90,6 +90,31 @@ fn where_datagrams_can_go() {
     }
 }
 
+/// Several sockets of a host may have one port, each with an address of its own.
+#[test]
+fn each_address_of_a_port_has_its_own_socket() {
+    for bed in beds() {
+        bed.run_twice(|bed| async move {
+            let (a, b) = (bed.host("a"), bed.host("b"));
+            let at = ["10.0.0.2:9", "127.0.0.1:9", "127.0.0.5:9", "[fd00::2]:9", "[::1]:9"];
+            let sockets = at.map(|at| b.bind(at).unwrap());
+            assert!(["0.0.0.0:9", "[::]:9", at[2]].iter().all(|taken| number(b.bind(*taken)) == Some(98)));
+            let [far, near] = [[a.bind("0.0.0.0:1").unwrap(), a.bind("[::]:2").unwrap()], [b.bind("0.0.0.0:1").unwrap(), b.bind("[::]:2").unwrap()]];
+            for (place, (at, socket)) in at.iter().zip(&sockets).enumerate() {
+                let senders = if matches!(place, 0 | 3) { &far } else { &near };
+                senders[usize::from(place > 2)].send_to(&[0; 9][..place], *at).await.unwrap();
+                assert_eq!(socket.recv(&mut [0; 9]).await.unwrap(), place, "{at}");
+            }
+            // The other sockets keep their addresses when the first socket is closed.
+            let [first, others @ ..] = sockets;
+            drop(first);
+            near[0].send_to(b"five", at[2]).await.unwrap();
+            assert_eq!(others[1].recv(&mut [0; 9]).await.unwrap(), 4);
+            assert_eq!(others[0].try_recv(&mut [0; 9]).unwrap_err().kind(), ErrorKind::WouldBlock);
+        });
+    }
+}
+
 #[test]
 fn a_broadcast_is_heard_by_sockets_of_all_addresses_and_by_no_others() {
     for to in ["255.255.255.255:5", "10.255.255.255:5"] {
