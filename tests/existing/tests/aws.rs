@@ -43,7 +43,7 @@ fn calls_are_answered() {
                     tokio::spawn(serve(listener.accept().await.unwrap().0));
                 }
             });
-            // The resolver of the SDK is that of the standard library, which knows no hosts of a test bed.
+            // The SDK looks names up by the standard library, which knows no hosts of a test bed.
             let endpoint = format!("http://{}", bed.host("server").ip());
             let client = bed.host("client").spawn(async {
                 let config = Config::builder()

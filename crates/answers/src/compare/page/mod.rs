@@ -100,7 +100,7 @@ fn stability(sheet: &Sheet<'_>) -> Html {
 
 /// Returns the section of the task: the shares of runs in which it was done.
 fn task(sheet: &Sheet<'_>) -> Html {
-    let about = "How many runs ended with the task done, with Wilson's interval of 95 %. The mean task time is that of these runs alone.";
+    let about = "How many runs ended with the task done, with Wilson's interval of 95 %. The mean task time counts these runs only.";
     // A single panel stands among the measures.
     let picture = if is_drawn(sheet) && sheet.layout.panels() > 1 {
         figure(Outcome::Done.name(), &sheet.shares(Outcome::Done), "Share of the runs whose task was done, with Wilson's interval of 95 %.")

@@ -78,7 +78,7 @@ impl GammaMap {
     /// Computes x(z) of several numbers with a relative error below 10⁻¹², or as 0 if x(z) is below e⁻¹⁰⁰. NaN without an accurate series.
     #[inline(always)]
     pub(super) fn nearly<const N: usize>(&self, z: &[f64; N], x: &mut [f64; N]) {
-        // A logarithm has a series in every cell in which x has one, so that only one sum is needed.
+        // The logarithm has a series in every cell in which x has a series, so that only one sum is needed.
         let Some(logarithms) = &self.logarithms else {
             return x.iter_mut().zip(z).for_each(|(x, z)| *x = sum(&self.cells, *z));
         };

@@ -17,8 +17,8 @@ impl Law {
     /// Mark of a delay that is not certain without computing the delay itself.
     pub(crate) const UNKNOWN: u64 = u64::MAX;
 
-    /// Returns [`Law::at_normal`] of several numbers, rounded to whole numbers, with [`Law::UNKNOWN`] where that is not certain without computing the delay
-    /// itself. The law is in nanoseconds. One step at a time for all numbers, so that a processor computes several of them together.
+    /// Returns [`Law::at_normal`] of several numbers, rounded to whole numbers, with [`Law::UNKNOWN`] where the whole number is not certain without computing the
+    /// delay itself. The law is in nanoseconds. One step at a time for all numbers, so that a processor computes several of them together.
     #[inline(always)]
     pub(crate) fn whole_at_normals<const N: usize>(&self, z: &[f64; N]) -> [u64; N] {
         let mut x = [0.0; N];

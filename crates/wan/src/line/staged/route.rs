@@ -1,4 +1,4 @@
-//! Route of packets: the stages of a layout, and those of them that a line has.
+//! Route of packets: the stages of a line, in the order of a layout.
 
 /// Stage of a link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

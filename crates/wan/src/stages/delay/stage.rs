@@ -200,7 +200,7 @@ impl CorrelatedDelays {
     pub(crate) fn draw_nanos(&mut self, now: Instant, (chain, at): (&mut f64, &mut Instant), word: u64, packet: PacketDraws) -> u64 {
         if self.is_in_time() {
             let span = now.as_nanos().saturating_sub(at.as_nanos());
-            // Links that are offered packets together share the weights, so that they are computed once for all of them.
+            // Links that are offered packets together share the weights, so that the weights are computed once for all these links.
             if span != self.weights.span {
                 self.weights = Weights::new(self.memory, span);
             }
@@ -278,7 +278,7 @@ fn normal(purpose: Purpose, word: u64, packet: PacketDraws) -> f64 {
     })
 }
 
-/// Returns a delay of a law that is drawn from a normal number. Not inlined, so that the draw of the normal law, the most frequent one, stays small enough to be.
+/// Returns a delay of a law that is drawn from a normal number. Not inlined, so that the draw of the normal law, the most frequent law, stays small enough for inlining.
 #[inline(never)]
 fn from_normal(law: &Law, purpose: Purpose, word: u64, packet: PacketDraws) -> u64 {
     at_normal(law, normal(purpose, word, packet))
@@ -358,7 +358,7 @@ mod tests {
     }
 
     /// Lag-one autocorrelation 0.9 by packet, and φ = e^(−8/76) = 0.9 in time at a spacing of 8 ms: of 100 000 delays the autocorrelation of a Gaussian
-    /// AR(1) has the standard error √((1−ρ²)/n) = 0.0014; other laws have heavier tails, at most three times that here.
+    /// AR(1) has the standard error √((1−ρ²)/n) = 0.0014; other laws have heavier tails, at most three times this error here.
     #[test]
     fn correlated_delays_have_their_law_and_their_correlation() {
         for distribution in [Distribution::Normal, Distribution::Uniform, Distribution::Gamma, Distribution::LogNormal] {
