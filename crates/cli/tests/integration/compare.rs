@@ -199,12 +199,18 @@ fn a_task_is_compared_by_the_runs_in_which_it_was_done() {
     for part in ["<h2>Task</h2>", "<figure id=\"done\">", "Share of the runs whose task was done", &format!("{} of 3 (", counts[7])] {
         assert!(page.contains(part), "no {part}");
     }
-    // The picture of the page is that of the file.
-    let done = desk.read("out/done.svg");
-    assert!(page.contains(&done[done.find("<path").unwrap()..done.rfind("</svg>").unwrap()]), "done.svg is another picture");
+    // Each file has the picture with the same name on the page.
+    for file in pictures {
+        let (picture, name) = (desk.read(&format!("out/{file}")), file.trim_end_matches(".svg"));
+        let shown = page.split(&format!(" id=\"{name}\"")).nth(1).and_then(|rest| rest.split("</figure>").next()).unwrap_or_default();
+        assert!(shown.contains(&picture[picture.find("<path").unwrap()..picture.rfind("</svg>").unwrap()]), "{file} is another picture");
+    }
     let before = folder(&desk, "out");
     desk.text(line);
     assert!(folder(&desk, "out") == before, "the second time other bytes are written");
+    // Too many panels are drawn neither on the page nor in files.
+    desk.text("compare together.toml --strategies AP,PD --vary link.delay=0ms,50ms --vary link.loss=0%..16%/17 --set task.timeout=100ms --runs 1 --out many");
+    assert!(!desk.files("many").iter().any(svg) && desk.read("many/compare.html").contains("No pictures: "));
 }
 
 #[test]
