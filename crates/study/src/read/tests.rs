@@ -51,7 +51,7 @@ fn every_refusal_has_a_place_and_a_way_out() {
         ("steps = 7", "step = 7", "study.toml:31:1: questions.1.step", "did you mean \"steps\"?"),
         ("ends = [\"not at all\", \"completely\"]", "ends = [\"not at all\"]", "study.toml:30:8: questions.1.ends", "two texts"),
         ("\"together\"", "\"task_time_s\"", "study.toml:25:1: questions.1", "that of an analysed measure"),
-        ("\"together\"", "\"TLX1\"", "study.toml:25:1: questions.1", "two questions have the name"),
+        ("\"together\"", "\"WORKLOAD\"", "study.toml:25:1: questions.1", "two questions have the name"),
         ("[analysis]", "[operator]\ncrossover = 2\n[analysis]", "study.toml:34:13: operator.crossover", "no condition has a task of kind track"),
         ("\"consent.md\"", "\"consnet.md\"", "study.toml:13:11: study.consent", "cannot read"),
         ("[task]\nkind = \"reach\"", "[tsak]\nkind = \"reach\"", "study.toml:5:9, by the key study.scene", "did you mean \"task\"?"),
