@@ -32,6 +32,13 @@ impl PathTask {
         self.points.windows(2).fold(0.0, |length, corners| length + distance(corners[0], corners[1]))
     }
 
+    /// Returns whether a copy with the progress `progress` \[m\] is at the end of the line: at most a hundredth of the width before the end. A copy that comes to
+    /// rest at the end comes ever closer and may never be there exactly.
+    #[must_use]
+    pub fn is_at_end(&self, progress: f64) -> bool {
+        progress >= self.length() - 0.01 * self.width
+    }
+
     /// Returns the point of the line after a length `along` \[m\]: an end of the line for a length below zero or above the length of the line.
     #[must_use]
     pub fn point(&self, along: f64) -> [f64; 3] {
@@ -123,6 +130,12 @@ mod tests {
             let path = PathTask { points: vec![[0.0; 3], [0.1, 0.0, 0.0], [0.1, up, 0.0]], ..corner() };
             assert_eq!(path.nearest([0.1, 2.0, 0.0], path.length() - 0.01).0.to_bits(), path.length().to_bits(), "{up}");
         }
+    }
+
+    #[test]
+    fn the_end_begins_a_hundredth_of_the_width_before_the_last_point() {
+        let path = corner();
+        assert!(path.is_at_end(path.length()) && path.is_at_end(0.2996) && !path.is_at_end(0.2994));
     }
 
     #[test]

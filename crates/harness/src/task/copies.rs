@@ -225,7 +225,7 @@ impl Group {
                 return Err(Failure { peer, reason: FailureReason::Left });
             }
         }
-        Ok(self.of(copies).iter().all(|copy| copy.progress >= path.length()))
+        Ok(self.of(copies).iter().all(|copy| path.is_at_end(copy.progress)))
     }
 
     /// Judges an instant of a task that holds a target. Returns the failure of a group that was outside for longer than the grace time.

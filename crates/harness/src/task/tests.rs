@@ -408,6 +408,9 @@ fn a_path_is_done_at_its_end_and_not_by_a_short_cut() {
     let there_and_back = [0.0, 0.0, 0.04, 0.08, 0.1, 0.07, 0.03, 0.0, 0.0, 0.0];
     assert_eq!(outcome(&task("fail"), &together(&there_and_back)), (TaskOutcome::Done, 7));
     assert_eq!(outcome(&task("count"), &together(&[0.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])), (TaskOutcome::TimedOut, 10));
+    // Copies that come to rest before the last point are at the end within a hundredth of the width, 0.4 mm.
+    let resting = |before: f64| outcome(&task("count"), &together(&[0.0, 0.0, 0.04, 0.08, 0.1, 0.07, 0.03, before, before, before]));
+    assert_eq!((resting(0.00039), resting(0.00041)), ((TaskOutcome::Done, 7), (TaskOutcome::TimedOut, 10)));
     // 21 mm beyond the turning point is outside, for 2 ms.
     let wide = [0.0, 0.0, 0.04, 0.08, 0.121, 0.121, 0.1, 0.07, 0.03, 0.0];
     let (result, judge, events) = judge_of(&scene(&task("count")), &together(&wide), &[], false, 10);
