@@ -5,7 +5,6 @@ mod kind;
 mod losses;
 mod switching;
 
-use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use cohaptic_units::Instant;
@@ -103,17 +102,21 @@ struct Other {
     line: OtherLine,
     /// Packets dropped in outages.
     outage: u64,
-    /// Packets without room in the queue.
-    found_full: u64,
 }
 
 /// Transmitter of a link of no kind.
 #[derive(Clone, Debug)]
 enum OtherLine {
-    /// A transmitter that does not change, and the instant at which the latest packet leaves the queue.
-    Constant(Line, Instant),
-    /// A transmitter that changes, with all other stages of the link, as a modulator says. Boxed, because few links have a modulator.
-    Switching(Box<Switching>),
+    /// A transmitter that does not change.
+    Constant {
+        line: Line,
+        /// Instant at which the latest packet leaves the queue.
+        departure: Instant,
+        /// Packets without room in the queue.
+        found_full: u64,
+    },
+    /// A transmitter that changes, with all other stages of the link, as a modulator says. No packet waits, so the queue is never full.
+    Switching(Switching),
 }
 
 impl DirectLinks {
@@ -158,7 +161,7 @@ impl DirectLinks {
         if let LinkModel::Modulated(modulated) = model {
             let Some((switching, direct)) = Switching::new(seed, name, modulated, self.load) else { return false };
             let draws = direct.draws;
-            let memory = self.other(direct, OtherLine::Switching(Box::new(switching)));
+            let memory = self.other(direct, OtherLine::Switching(switching));
             self.links.push(LinkState::new(draws, memory));
             return true;
         }
@@ -186,7 +189,7 @@ impl DirectLinks {
             Some((place, _)) => Memory::Plain(place),
             None => {
                 let line = Line::new(config, self.load).expect("such a link is taken");
-                self.other(Direct::new(seed, name, config), OtherLine::Constant(line, Instant::ZERO))
+                self.other(Direct::new(seed, name, config), OtherLine::Constant { line, departure: Instant::ZERO, found_full: 0 })
             }
         };
         self.links.push(LinkState::new(draws, memory));
@@ -195,7 +198,7 @@ impl DirectLinks {
 
     /// Adds a link of no kind, and returns its place.
     fn other(&mut self, direct: Direct, line: OtherLine) -> Memory {
-        self.others.push(Other { direct, line, outage: 0, found_full: 0 });
+        self.others.push(Other { direct, line, outage: 0 });
         Memory::Other(u32::try_from(self.others.len() - 1).expect("fewer than 2^32 links fit into memory"))
     }
 
@@ -357,7 +360,11 @@ impl DirectLinks {
             // A kind without queue drops no packet for want of room, and no kind has outages.
             Memory::Plain(_) | Memory::Chained(_) => (0, 0),
             Memory::Remembering(_) => (0, self.remembered[link.index()].found_full),
-            Memory::Other(place) => (self.others[place as usize].outage, self.others[place as usize].found_full),
+            Memory::Other(place) => {
+                let Other { line, outage, .. } = &self.others[place as usize];
+                let found_full = if let OtherLine::Constant { found_full, .. } = line { *found_full } else { 0 };
+                (*outage, found_full)
+            }
         };
         let dropped = [(DropCause::Outage, outage), (DropCause::Loss, lost), (DropCause::QueueFull, found_full)];
         LinkStats::counted(offered, delivered, delay_nanos, dropped)
@@ -384,9 +391,12 @@ impl Other {
         let Self { direct, line, .. } = self;
         // The queue stands between loss and delay, as in the general pipeline.
         let fate = match line {
-            OtherLine::Constant(line, departure) => direct.offer_through(now, number, words, |now| match line {
+            OtherLine::Constant { line, departure, found_full } => direct.offer_through(now, number, words, |now| match line {
                 Line::Free(nanos) => Ok(now.saturating_add_nanos(*nanos)),
-                Line::Queued(queue) => queue.offer(now, departure).ok_or(DropCause::QueueFull),
+                Line::Queued(queue) => queue.offer(now, departure).ok_or_else(|| {
+                    *found_full += 1;
+                    DropCause::QueueFull
+                }),
             }),
             OtherLine::Switching(switching) => {
                 switching.pass(now, direct);
@@ -405,10 +415,7 @@ impl Other {
                 self.outage += 1;
                 Verdict::Dropped
             }
-            Err(DropCause::QueueFull) => {
-                self.found_full += 1;
-                Verdict::Dropped
-            }
+            Err(DropCause::QueueFull) => Verdict::Dropped,
             // The remaining cause is loss: a direct link has no further causes.
             Err(_) => Verdict::Lost,
         }

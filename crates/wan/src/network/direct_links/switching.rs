@@ -3,6 +3,7 @@
 //! The changes of state are a function of the seed and the name of the modulator, so that the departure of a packet is certain at its offer, also where the
 //! rate changes while the packet is in transmission.
 
+use alloc::boxed::Box;
 use alloc::sync::Arc;
 
 use cohaptic_units::{Instant, Rate};
@@ -13,14 +14,23 @@ use crate::stages::config::{Layout, LinkConfig};
 use crate::stages::modulation::{Modulated, ModulationStage};
 use crate::stages::queue::{Discipline, Load, Service, giga_bits, nanos};
 
-/// Modulator of one link, and the transmitter of the link in each state.
+/// Modulator of one link, and the transmitter of the link in each state. Numbers that every packet reads stand here, and the rest is boxed, so that a mesh of
+/// such links reads fewer cache lines.
 #[derive(Clone, Debug)]
 pub(super) struct Switching {
-    stage: ModulationStage,
     /// Instant of the next change, or the end of time.
     next: Instant,
     /// Departure of the latest packet.
     departure: Instant,
+    /// Transmission time of a packet in the present state \[ns\].
+    time: u64,
+    states: Box<States>,
+}
+
+/// States of the modulator of one link.
+#[derive(Clone, Debug)]
+struct States {
+    stage: ModulationStage,
     /// Indexed by state.
     transmitters: Arc<[Transmitter]>,
 }
@@ -54,7 +64,8 @@ impl Switching {
         let mut direct = Direct::new(seed, name, &LinkConfig::default());
         direct.reconfigure(Instant::ZERO, stage.config());
         let next = stage.next_change().unwrap_or(Instant::MAX);
-        Some((Self { stage, next, departure: Instant::ZERO, transmitters }, direct))
+        let states = Box::new(States { stage, transmitters });
+        Some((Self { next, departure: Instant::ZERO, time: states.transmitter().time, states }, direct))
     }
 
     /// Lets all changes up to `now` happen.
@@ -69,7 +80,7 @@ impl Switching {
     #[inline]
     pub(super) fn departure(&mut self, now: Instant, direct: &mut Direct) -> Instant {
         let begin = now.max(self.departure);
-        let leaves = begin.saturating_add_nanos(self.transmitter().time);
+        let leaves = begin.saturating_add_nanos(self.time);
         // A departure at the instant of a change comes before the change.
         self.departure = if leaves <= self.next { leaves } else { self.departure_over_changes(begin, direct) };
         self.departure
@@ -77,10 +88,10 @@ impl Switching {
 
     #[cold]
     fn departure_over_changes(&mut self, mut since: Instant, direct: &mut Direct) -> Instant {
-        let mut left = self.transmitter().bits;
+        let mut left = self.states.transmitter().bits;
         loop {
             // Either every state has a rate or none, and without a rate a packet takes no time and meets no change.
-            let Some(rate) = self.transmitter().rate else { return since };
+            let Some(rate) = self.states.transmitter().rate else { return since };
             let leaves = since.saturating_add(rate.transmission_time(left));
             if leaves <= self.next {
                 return leaves;
@@ -92,15 +103,19 @@ impl Switching {
         }
     }
 
-    fn transmitter(&self) -> &Transmitter {
-        &self.transmitters[self.stage.state()]
-    }
-
     #[cold]
     fn change(&mut self, direct: &mut Direct) {
-        self.stage.change();
-        direct.reconfigure(self.next, self.stage.config());
-        self.next = self.stage.next_change().unwrap_or(Instant::MAX);
+        let stage = &mut self.states.stage;
+        stage.change();
+        direct.reconfigure(self.next, stage.config());
+        self.next = stage.next_change().unwrap_or(Instant::MAX);
+        self.time = self.states.transmitter().time;
+    }
+}
+
+impl States {
+    fn transmitter(&self) -> &Transmitter {
+        &self.transmitters[self.stage.state()]
     }
 }
 
