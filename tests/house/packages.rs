@@ -157,8 +157,15 @@ fn every_package_says_what_a_registry_shows() {
 }
 
 /// Libraries that are of use without the rest of the project, each with the example that its README shows. The test of the example compares its output.
-const ALONE: [(&str, &str); 6] =
-    [("falcon", "wall"), ("peer", "two_hands"), ("stability", "how_stiff"), ("tcp", "download"), ("testkit", "paid_twice"), ("wan", "call")];
+const ALONE: [(&str, &str); 7] = [
+    ("device", "lever"),
+    ("falcon", "wall"),
+    ("peer", "two_hands"),
+    ("stability", "how_stiff"),
+    ("tcp", "download"),
+    ("testkit", "paid_twice"),
+    ("wan", "call"),
+];
 
 #[test]
 fn libraries_of_use_alone_package_a_readme_and_its_example() {
