@@ -7,9 +7,10 @@ use crate::house::metadata::{Tree, metadata};
 use crate::house::{files, name, root};
 
 /// Packages that use nothing of Linux.
-const PORTABLE: [&str; 17] = [
+const PORTABLE: [&str; 18] = [
     "sockets",
     "units",
+    "device",
     "files",
     "wan",
     "capture",

@@ -42,6 +42,8 @@ struct Shared {
 /// Driver of the lever.
 struct Lever {
     shared: Arc<Shared>,
+    /// Newest answer that the loop has seen, and its time.
+    latest: Option<(Reading, Instant)>,
     begun: Clock,
     stopper: Stopper,
     thread: Option<JoinHandle<()>>,
@@ -66,7 +68,7 @@ impl Lever {
             }
             board.exchange(0.0);
         });
-        Ok(Self { shared, begun, stopper, thread: Some(thread) })
+        Ok(Self { shared, latest: None, begun, stopper, thread: Some(thread) })
     }
 }
 
@@ -94,7 +96,9 @@ impl Device for Lever {
     }
 
     fn read(&mut self, _now: Instant) -> Option<Reading> {
-        let (reading, at) = now_or_never(&self.shared.answer)??;
+        // While the thread writes an answer, the one before is new enough.
+        self.latest = now_or_never(&self.shared.answer).flatten().or(self.latest);
+        let (reading, at) = self.latest?;
         // A lever whose board has not answered for 20 ms is absent.
         (since(self.begun).saturating_duration_since(at) <= Duration::from_millis(20)).then_some(reading)
     }

@@ -13,7 +13,7 @@ pub struct Description {
     pub name: String,
     /// Number of motions with a motor, 0 to 3: the first axes of x, y, z.
     pub motions: usize,
-    /// Greatest force that may be asked of the device \[N\], 0 to 20.
+    /// Greatest force that may be asked of the device \[N\], 0 to 20. The gate of a session takes the force as its limit; another number counts as 0.
     pub force: f64,
     /// Time from one exchange with the device to the next.
     pub period: Duration,
@@ -46,7 +46,8 @@ pub trait Device: Send {
     /// Returns the handle that stops the device from any thread. Every call returns a clone of the same stopper.
     fn stopper(&self) -> Stopper;
 
-    /// Returns position \[m\] and velocity \[m/s\] at the tick at `now`. Returns `None` if the device is absent, does not answer, or is not ready or not armed.
+    /// Returns position \[m\] and velocity \[m/s\] at the tick at `now`. Returns `None` if the device is absent, does not answer, or is not ready or not armed:
+    /// the force is then zero at once. While the driver's thread holds the newest reading, the reading before is the answer.
     ///
     /// A peer with a long silent device lets go of the object gradually, and takes the object up again gradually after the return of the device.
     fn read(&mut self, now: Instant) -> Option<Reading>;

@@ -3,7 +3,7 @@
 //! Use this crate if you drive a Novint Falcon from Rust, or test such a program without the device.
 //!
 //! ```text
-//!                 device            a Falcon as the device of a peer
+//!                 device            a Falcon as the device of a session
 //!                    │
 //!        boot     driver            one exchange after the other
 //!          │    ┌────┼────────┐
@@ -16,10 +16,11 @@
 //!
 //! [`usb`] opens a real device, and [`simulator`] makes a simulated device with the same bytes. [`boot`] loads the user's firmware into either device.
 //! [`driver::Driver`] exchanges packets and tracks homing and the position of the grip. [`device::FalconDevice`] runs a driver in a thread at 1 kHz and is a
-//! [`Device`](cohaptic_peer::Device) of a peer.
+//! [`Device`](cohaptic_device::Device) of a session.
 //!
-//! Only a [`safety::ForceGate`] makes motor counts. The gate gives zero force before the device is homed and the user has switched forces on, for numbers
-//! that are not finite, for old setpoints and old readings, and after a stop. The gate limits size and rate of change of all other forces.
+//! Only a [`safety::ForceGate`] makes motor counts, of the force that a [`Gate`](cohaptic_device::Gate) admits for each packet. The gate gives zero force before
+//! the device is homed and the user has switched forces on, for numbers that are not finite, for old setpoints and old readings, and after a stop. The gate
+//! limits size and rate of change of all other forces.
 //!
 //! No part of this crate was tried on hardware. All knowledge of the device comes from published drivers and captures, and every unknown is a parameter.
 //!

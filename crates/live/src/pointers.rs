@@ -7,12 +7,14 @@
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 use std::time::Duration;
 
-use cohaptic_harness::live::LiveDevice;
-use cohaptic_peer::State;
+use cohaptic_device::{Description, Device, GatedForce, Reading, Stopper};
 use cohaptic_units::Instant;
 
 /// Largest absolute value of a pointer's coordinate \[m\]. No arm reaches so far.
 pub const REACH: f64 = 10.0;
+
+/// Greatest force of a pointer \[N\]. A mouse has no motors, so the bound is that of every device.
+pub const FORCE: f64 = 20.0;
 
 /// Time without a new position after which a pointer counts as absent.
 const OLD: Duration = Duration::from_millis(100);
@@ -47,7 +49,7 @@ struct Shared {
     /// Rest of the way at the end of the session's latest tick, on a clock that begins with the next session. The next session goes on with this way. `None`
     /// if there is no way.
     rest: Option<Way>,
-    /// Coupling force FC of the latest tick \[N\].
+    /// Force on the hand of the latest tick \[N\].
     force: [f64; 3],
 }
 
@@ -78,7 +80,8 @@ impl Pointer {
         Ok(())
     }
 
-    /// Returns the force between device and copy computed last by the session \[N\], for motors in the pointer.
+    /// Returns the force between device and copy computed last by the session, as the hand feels it \[N\], for motors in the pointer. The gate of the session has
+    /// limited the force to [`FORCE`] and to 1000 N/s.
     #[must_use]
     pub fn force(&self) -> [f64; 3] {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).force
@@ -86,9 +89,9 @@ impl Pointer {
 
     /// Returns the pointer as a device of a session.
     #[must_use]
-    pub fn device(&self) -> Box<dyn LiveDevice> {
+    pub fn device(&self) -> Box<dyn Device> {
         let shared = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        Box::new(PointerDevice { pointer: self.clone(), told: shared.told, newest: None, way: shared.rest })
+        Box::new(PointerDevice { pointer: self.clone(), told: shared.told, newest: None, way: shared.rest, stopper: Stopper::default() })
     }
 }
 
@@ -108,20 +111,20 @@ impl Way {
     /// Returns the rest of the way after `now`, for a clock that begins at `now`.
     fn rest(&self, now: Instant) -> Self {
         let left = self.begin.saturating_add(self.span).saturating_duration_since(now);
-        let State { position: from, .. } = self.at(now);
+        let Reading { position: from, .. } = self.at(now);
         // After the end of the way both positions are the same, and any duration above zero will do.
         Self { from, to: self.to, begin: Instant::ZERO, span: if left.is_zero() { QUICKEST } else { left } }
     }
 
     /// Returns position \[m\] and velocity [m/s] at the instant `now`.
-    fn at(&self, now: Instant) -> State<3> {
+    fn at(&self, now: Instant) -> Reading {
         let Self { from, to, begin, span } = *self;
         // Before `begin` the difference is zero, so that the position is `from`.
         let gone = now.saturating_duration_since(begin).as_secs_f64() / span.as_secs_f64();
         if gone >= 1.0 {
-            return State { position: to, velocity: [0.0; 3] };
+            return Reading { position: to, velocity: [0.0; 3] };
         }
-        State {
+        Reading {
             position: core::array::from_fn(|axis| from[axis] + gone * (to[axis] - from[axis])),
             velocity: core::array::from_fn(|axis| (to[axis] - from[axis]) / span.as_secs_f64()),
         }
@@ -137,10 +140,19 @@ struct PointerDevice {
     newest: Option<Instant>,
     /// Present way. `None` before the first position, and after the pointer has let go.
     way: Option<Way>,
+    stopper: Stopper,
 }
 
-impl LiveDevice for PointerDevice {
-    fn read(&mut self, now: Instant) -> Option<State<3>> {
+impl Device for PointerDevice {
+    fn description(&self) -> Description {
+        Description { name: "pointer".to_owned(), motions: 3, force: FORCE, period: QUICKEST }
+    }
+
+    fn stopper(&self) -> Stopper {
+        self.stopper.clone()
+    }
+
+    fn read(&mut self, now: Instant) -> Option<Reading> {
         // The program holds the lock only while it copies a few numbers. If the lock is held, the next tick is soon enough: this thread must not wait.
         let told = match self.pointer.0.try_lock() {
             Ok(shared) => shared.told,
@@ -165,10 +177,10 @@ impl LiveDevice for PointerDevice {
         self.way.as_ref().map(|way| way.at(now))
     }
 
-    fn hold(&mut self, now: Instant, _span: Duration, coupling_force: [f64; 3]) {
+    fn hold(&mut self, now: Instant, _span: Duration, force: GatedForce) {
         // If the lock is held, the force of the next tick is soon enough.
         if let Ok(mut shared) = self.pointer.0.try_lock() {
-            shared.force = coupling_force;
+            shared.force = force.newtons();
             shared.rest = self.way.as_ref().map(|way| way.rest(now));
         }
     }
@@ -176,6 +188,7 @@ impl LiveDevice for PointerDevice {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_device::{Gate, Limits, Moment};
     use proptest::prelude::*;
 
     use super::*;
@@ -184,7 +197,7 @@ mod tests {
         Instant::from_nanos(millis * 1_000_000)
     }
 
-    fn x(device: &mut dyn LiveDevice, millis: u64) -> Option<[f64; 2]> {
+    fn x(device: &mut dyn Device, millis: u64) -> Option<[f64; 2]> {
         device.read(at(millis)).map(|state| [state.position[0], state.velocity[0]])
     }
 
@@ -243,7 +256,12 @@ mod tests {
         // 20 mm in 20 ms, of which 15 ms have passed when the session ends.
         near(x(&mut *device, 30), [0.01, 1.0]);
         near(x(&mut *device, 45), [0.025, 1.0]);
-        device.hold(at(45), Duration::from_millis(1), [0.25, 0.0, 0.0]);
+        let mut gate = Gate::new(Limits::DEFAULT, device.stopper()).unwrap();
+        let force = [44, 45].map(|millis| {
+            let now = at(millis);
+            gate.admit([0.25, 0.0, 0.0], &Moment { now, ready: true, armed: true, reading_at: Some(now), setpoint_at: Some(now) }).force
+        });
+        device.hold(at(45), Duration::from_millis(1), force[1]);
         assert_eq!(pointer.force().map(f64::to_bits), [0.25_f64.to_bits(), 0, 0]);
         let mut next = pointer.device();
         near(x(&mut *next, 0), [0.025, 1.0]);
@@ -252,7 +270,7 @@ mod tests {
         near(x(&mut *next, 3), [0.028, 1.0]);
         pointer.tell(Some([0.096, 0.0, 0.0])).unwrap();
         near(x(&mut *next, 11), [0.036, 0.06 / 0.068]);
-        device.hold(at(99), Duration::from_millis(1), [0.0; 3]);
+        device.hold(at(99), Duration::from_millis(1), GatedForce::ZERO);
         near(x(&mut *pointer.device(), 0), [0.03, 0.0]);
     }
 
@@ -273,7 +291,7 @@ mod tests {
                     farthest = farthest.max(x.abs());
                 }
                 if let Some(state) = device.read(at(now)) {
-                    prop_assert!(state.is_finite() && state.position[0].abs() <= farthest + 1e-12);
+                    prop_assert!(state.position[0].is_finite() && state.velocity[0].is_finite() && state.position[0].abs() <= farthest + 1e-12);
                 }
             }
         }

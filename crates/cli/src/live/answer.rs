@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use cohaptic_answers::{access_line, link_quantiles, link_totals, measured_lines, measures_of, peer, peer_links, rotation, task_of};
 use cohaptic_harness::Ending;
-use cohaptic_harness::live::SeatStats;
+use cohaptic_harness::live::{GateStats, SeatStats};
 use cohaptic_harness::task::task_words;
 use cohaptic_live::{AdmissionStats, Report, SocketCounts};
 use cohaptic_realtime::Wish;
@@ -27,6 +27,8 @@ pub(super) fn of(scene: &Scene, report: &Report) -> impl Serialize {
             peer: peer(summary),
             #[serde(flatten)]
             seat: report.seats[place].as_ref().map(|seat| document! { seat: of_seat(seat) }),
+            #[serde(flatten)]
+            gate: report.gates[place].as_ref().map(|gate| document! { gate: of_gate(gate) }),
         }
     });
     document! {
@@ -64,6 +66,15 @@ pub(super) fn of(scene: &Scene, report: &Report) -> impl Serialize {
 fn of_seat(seat: &SeatStats) -> impl Serialize + use<> {
     let SeatStats { taken, joined, refused, out_of_order, late, most_late } = *seat;
     document! { taken: taken, joined: joined, refused: refused, out_of_order: out_of_order, late: late, most_late_us: micros(most_late) }
+}
+
+/// Returns the forces on a hand that the gate of the session changed or made zero.
+fn of_gate(gate: &GateStats) -> impl Serialize + use<> {
+    document! {
+        zeroed: gate.causes().map(|(cause, count)| (cause.name(), count)).collect::<BTreeMap<_, _>>(),
+        limited: gate.limited,
+        slewed: gate.slewed,
+    }
 }
 
 fn of_admission(stats: &AdmissionStats, socket: &SocketCounts) -> impl Serialize + use<> {
@@ -106,6 +117,12 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
         let position: Vec<String> = peer.position.iter().map(|x| length(*x)).collect();
         let seat = seat.as_ref().map(came).unwrap_or_default();
         line(format!("{} ({}) ends at {}{seat}", peer.name, spec.kind.name(), position.join(", ")));
+    }
+    for (gate, spec) in report.gates.iter().zip(&scene.peers) {
+        let causes: Vec<String> = gate.iter().flat_map(GateStats::causes).map(|(cause, count)| format!("{}: {count}", cause.name())).collect();
+        if !causes.is_empty() {
+            line(format!("ticks without force on the hand of {}: {}", spec.name, causes.join(", ")));
+        }
     }
     line(packets(summary));
     report.task.iter().for_each(|task| line(format!("task: {}", task_words(task, scene))));

@@ -10,7 +10,7 @@ use std::thread;
 use std::time::{Duration, Instant as Clock};
 
 use cohaptic_control::{Hands, LinkEditor, Role, Stage, StageFile};
-use cohaptic_harness::live::LiveDevice;
+use cohaptic_device::Device;
 use cohaptic_live::PeerStatus;
 use cohaptic_live::pointers::Pointer;
 use cohaptic_peer::Coordination;
@@ -119,7 +119,7 @@ impl PlayStage {
     }
 
     /// Returns the device of the pointer of peer `place`; `None` if `place` is not below the largest number of peers.
-    pub(super) fn device(&self, place: usize) -> Option<Box<dyn LiveDevice>> {
+    pub(super) fn device(&self, place: usize) -> Option<Box<dyn Device>> {
         self.pointers.get(place).map(Pointer::device)
     }
 

@@ -1,7 +1,7 @@
-//! A Falcon as the device of a peer.
+//! A Falcon as the [`Device`](cohaptic_device::Device) of a session or of a loop.
 //!
-//! [`FalconDevice`] exchanges packets at 1 kHz in a thread of its own. Peer and thread pass values through memory without waiting for each other.
-//! [`SteppedFalcon`] has no thread and is driven by the peer's ticks, which a simulated Falcon in virtual time needs.
+//! [`FalconDevice`] exchanges packets at 1 kHz in a thread of its own. Session and thread pass values through memory without waiting for each other.
+//! [`SteppedFalcon`] has no thread and is driven by the session's ticks, which a simulated Falcon in virtual time needs.
 
 mod axes;
 mod mailbox;
@@ -11,5 +11,5 @@ mod turn;
 
 pub use axes::{Axes, AxesError, Axis};
 pub use stepped::SteppedFalcon;
-pub use threaded::{Ended, FalconDevice, StartError, Stopper};
+pub use threaded::{Ended, FalconDevice, StartError};
 pub use turn::{DeviceConfig, DeviceConfigError, Hold, LoopStatistics, Snapshot};

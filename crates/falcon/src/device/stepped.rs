@@ -2,15 +2,15 @@
 
 use core::time::Duration;
 
-use cohaptic_peer::{Device, State};
+use cohaptic_device::{Description, Device, GatedForce, Reading, Stopper};
 use cohaptic_units::Instant;
 
-use super::turn::{Turns, state};
+use super::turn::{Turns, description, reading};
 use super::{DeviceConfig, Snapshot, StartError};
 use crate::driver::DriverError;
 use crate::transport::Transport;
 
-/// A Falcon driven by the ticks of its peer: each [`Device::advance`] exchanges packets until the end of the tick on the transport's clock.
+/// A Falcon driven by the ticks of a session or a loop: each [`Device::hold`] exchanges packets until the end of the tick on the transport's clock.
 ///
 /// On a [simulated transport in virtual time](crate::simulator::SimulatedTransport::in_virtual_time) a whole cooperation is deterministic. A real device
 /// needs a [`FalconDevice`](super::FalconDevice), whose exchanges go on when the peer pauses.
@@ -18,7 +18,6 @@ use crate::transport::Transport;
 pub struct SteppedFalcon<T: Transport, const A: usize> {
     turns: Turns<T, A>,
     config: DeviceConfig<A>,
-    state: State<A>,
     /// End of the last tick on the transport's clock.
     reached: Instant,
     /// Error of the driver, after which there are no more exchanges.
@@ -26,7 +25,7 @@ pub struct SteppedFalcon<T: Transport, const A: usize> {
 }
 
 impl<T: Transport, const A: usize> SteppedFalcon<T, A> {
-    /// Opens the driver. Until the device is homed, its state is rest at the origin.
+    /// Opens the driver.
     ///
     /// # Errors
     ///
@@ -35,7 +34,7 @@ impl<T: Transport, const A: usize> SteppedFalcon<T, A> {
         let config = config.checked()?;
         let turns = Turns::open(transport, config)?;
         let reached = turns.driver.now();
-        Ok(Self { turns, config, state: State::REST, reached, ended: None })
+        Ok(Self { turns, config, reached, ended: None })
     }
 
     /// Exchanges packets without force for `span`, to home the device before a peer uses it. Returns the device after the last exchange.
@@ -60,11 +59,6 @@ impl<T: Transport, const A: usize> SteppedFalcon<T, A> {
         self.ended.as_ref()
     }
 
-    /// Stops the force, and tells the device.
-    pub fn stop(&mut self) {
-        self.turns.driver.stop();
-    }
-
     fn run(&mut self, span: Duration) {
         // Ticks add up from the end of the last tick, so that late exchanges do not lengthen the run.
         self.reached = self.reached.saturating_add(span);
@@ -72,19 +66,30 @@ impl<T: Transport, const A: usize> SteppedFalcon<T, A> {
             self.ended = self.turns.exchange().err();
             self.turns.pace();
         }
-        // Read once per tick: `Device::state` must give the same answer for the whole tick.
-        self.state = state(&self.snapshot(), &self.config, self.state);
     }
 }
 
-impl<T: Transport, const A: usize> Device<A> for SteppedFalcon<T, A> {
-    fn state(&self) -> State<A> {
-        self.state
+impl<T: Transport + Send, const A: usize> Device for SteppedFalcon<T, A> {
+    fn description(&self) -> Description {
+        description(&self.config)
     }
 
-    fn advance(&mut self, _now: Instant, span: Duration, coupling_force: [f64; A]) {
-        // The coupling force acts on the copy, and with the opposite sign on the grip.
-        self.turns.want(self.config.axes.to_device(coupling_force.map(|part| -part)));
+    fn stopper(&self) -> Stopper {
+        self.turns.driver.stopper().clone()
+    }
+
+    /// Returns the grip at the end of the last tick; `None` until forces are switched on, and after an error of the driver.
+    fn read(&mut self, _now: Instant) -> Option<Reading> {
+        reading(&self.snapshot(), &self.config).filter(|_| self.ended.is_none())
+    }
+
+    fn hold(&mut self, _now: Instant, span: Duration, force: GatedForce) {
+        self.turns.want(force);
         self.run(span);
+    }
+
+    /// Ends the force for good, and tells the device.
+    fn stop(&mut self) {
+        self.turns.driver.stop();
     }
 }

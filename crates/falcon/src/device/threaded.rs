@@ -1,32 +1,30 @@
 //! Falcon with a thread of its own.
 
-use core::cell::Cell;
-use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use std::io;
 use std::sync::{Arc, OnceLock};
 use std::thread::{Builder, JoinHandle};
 
-use cohaptic_peer::{Device, State};
+use cohaptic_device::{Description, Device, GatedForce, Reading, Stopper};
 use cohaptic_units::Instant;
 use thiserror::Error;
 
 use super::mailbox::Mailbox;
-use super::turn::{Turns, state};
+use super::turn::{Turns, description, reading};
 use super::{DeviceConfig, DeviceConfigError, Snapshot};
 use crate::driver::DriverError;
-use crate::kinematics::Triple;
 use crate::transport::Transport;
 
-/// Memory shared by peer and thread.
+/// Time without a new snapshot after which a device counts as absent. The driver of the device has switched the force off long before.
+const OLD: Duration = Duration::from_millis(20);
+
+/// Memory shared by session and thread.
 #[derive(Debug)]
 struct Shared {
-    /// Force on the grip \[N\], written by the peer.
-    wanted: Mailbox<Triple>,
+    /// Force on the hand in the axes of the peer, written by the session.
+    wanted: Mailbox<GatedForce>,
     /// Device after the newest exchange, written by the thread.
     snapshot: Mailbox<Snapshot>,
-    /// `true` if the thread is to stop the device and end.
-    stop: AtomicBool,
     /// End of the thread, set once.
     ended: OnceLock<Ended>,
 }
@@ -44,23 +42,21 @@ pub enum Ended {
 
 /// A Falcon in a user's hand, driven by a thread.
 ///
-/// The thread exchanges packets every period with the newest force of the peer. If the peer gives no new force for longer than the [age of a
+/// The thread exchanges packets every period with the newest force of the session. If the session gives no new force for longer than the [age of a
 /// setpoint](crate::safety::Limits::setpoint_age), the force becomes zero. A drop of this value makes the thread stop the device and end.
-///
-/// [`Device::state`] is read at the first call after a tick, and stays the same until the next [`Device::advance`].
 #[derive(Debug)]
 pub struct FalconDevice<const A: usize> {
     shared: Arc<Shared>,
+    /// Stopper of the driver's gate.
+    stopper: Stopper,
     thread: Option<JoinHandle<()>>,
     config: DeviceConfig<A>,
-    /// State of the present tick; `None` before the first call of [`Device::state`] in the tick.
-    latched: Cell<Option<State<A>>>,
-    /// Last state read, for a device that is no longer homed.
-    last: Cell<State<A>>,
+    /// Newest snapshot that was read, and the instant of the first look at the snapshot on the clock of the reader.
+    newest: Option<(Snapshot, Instant)>,
 }
 
 impl<const A: usize> FalconDevice<A> {
-    /// Opens the driver and starts the thread. Until the device is homed, its state is rest at the origin.
+    /// Opens the driver and starts the thread.
     ///
     /// # Errors
     ///
@@ -82,7 +78,8 @@ impl<const A: usize> FalconDevice<A> {
         let config = config.checked()?;
         // Opened here, not in the thread, so that the caller gets the error.
         let turns = Turns::open(transport, config)?;
-        let shared = Arc::new(Shared { wanted: Mailbox::new(), snapshot: Mailbox::new(), stop: AtomicBool::new(false), ended: OnceLock::new() });
+        let stopper = turns.driver.stopper().clone();
+        let shared = Arc::new(Shared { wanted: Mailbox::new(), snapshot: Mailbox::new(), ended: OnceLock::new() });
         let theirs = Arc::clone(&shared);
         let work = move || {
             first();
@@ -91,7 +88,7 @@ impl<const A: usize> FalconDevice<A> {
             let _ = theirs.ended.set(ended);
         };
         let thread = Builder::new().name("falcon".to_owned()).spawn(work).map_err(StartError::Thread)?;
-        Ok(Self { shared, thread: Some(thread), config, latched: Cell::new(None), last: Cell::new(State::REST) })
+        Ok(Self { shared, stopper, thread: Some(thread), config, newest: None })
     }
 
     /// Returns the device after its last exchange; `None` before the first exchange.
@@ -106,16 +103,10 @@ impl<const A: usize> FalconDevice<A> {
         self.shared.ended.get().copied()
     }
 
-    /// Returns a handle that stops the device from another thread, for example from a handler of signals.
-    #[must_use]
-    pub fn stopper(&self) -> Stopper {
-        Stopper(Arc::clone(&self.shared))
-    }
-
     /// Stops the device, waits for the end of the thread, and returns the reason of the end. `None` if the thread panicked; the drop of its driver has then
     /// switched the force off.
-    pub fn stop(&mut self) -> Option<Ended> {
-        self.stopper().stop();
+    pub fn stop_and_wait(&mut self) -> Option<Ended> {
+        self.stopper.stop();
         if let Some(thread) = self.thread.take() {
             // The panic hook has printed the message of a panic in the thread.
             let _ = thread.join();
@@ -126,37 +117,34 @@ impl<const A: usize> FalconDevice<A> {
 
 impl<const A: usize> Drop for FalconDevice<A> {
     fn drop(&mut self) {
-        self.stop();
+        self.stop_and_wait();
     }
 }
 
-impl<const A: usize> Device<A> for FalconDevice<A> {
-    fn state(&self) -> State<A> {
-        if let Some(state) = self.latched.get() {
-            return state;
+impl<const A: usize> Device for FalconDevice<A> {
+    fn description(&self) -> Description {
+        description(&self.config)
+    }
+
+    fn stopper(&self) -> Stopper {
+        self.stopper.clone()
+    }
+
+    fn read(&mut self, now: Instant) -> Option<Reading> {
+        // Without a snapshot at this call, because the thread is replacing it, the one before counts.
+        if let Some(snapshot) = self.snapshot() {
+            // A repeated time stamp is a repeated snapshot, and keeps the instant of the first appearance.
+            let came = self.newest.filter(|(newest, _)| newest.at == snapshot.at).map_or(now, |(_, came)| came);
+            self.newest = Some((snapshot, came));
         }
-        // Between the start and the first exchange there is no snapshot.
-        let state = self.snapshot().map_or_else(|| self.last.get(), |snapshot| state(&snapshot, &self.config, self.last.get()));
-        self.latched.set(Some(state));
-        self.last.set(state);
-        state
+        let (snapshot, came) = self.newest.as_ref()?;
+        // A device with an ended thread keeps the last snapshot, which may say that the device is ready.
+        let takes_part = self.ended().is_none() && now.saturating_duration_since(*came) <= OLD;
+        reading(snapshot, &self.config).filter(|_| takes_part)
     }
 
-    fn advance(&mut self, _now: Instant, _span: Duration, coupling_force: [f64; A]) {
-        // The coupling force acts on the copy, and with the opposite sign on the grip.
-        self.shared.wanted.write(self.config.axes.to_device(coupling_force.map(|part| -part)));
-        self.latched.set(None);
-    }
-}
-
-/// A handle that stops a device from another thread.
-#[derive(Clone, Debug)]
-pub struct Stopper(Arc<Shared>);
-
-impl Stopper {
-    /// Tells the thread to stop the device, and returns without waiting.
-    pub fn stop(&self) {
-        self.0.stop.store(true, Ordering::Release);
+    fn hold(&mut self, _now: Instant, _span: Duration, force: GatedForce) {
+        self.shared.wanted.write(force);
     }
 }
 
@@ -165,7 +153,7 @@ fn run<T: Transport, const A: usize>(mut turns: Turns<T, A>, shared: &Shared) ->
     let mut seen = 0;
     let ended = loop {
         // The stop comes first, so that no force follows a stop that was asked before this turn.
-        if shared.stop.load(Ordering::Acquire) {
+        if turns.driver.stopper().is_stopped() {
             turns.driver.stop();
             break Ended::Stopped;
         }

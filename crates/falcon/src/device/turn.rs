@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use cohaptic_peer::State;
+use cohaptic_device::{Description, GatedForce};
 use cohaptic_units::Instant;
 use thiserror::Error;
 
@@ -103,9 +103,10 @@ impl<T: Transport, const A: usize> Turns<T, A> {
         Ok(Self { driver, config, wanted: None, next, timing: LoopStatistics::default() })
     }
 
-    /// Sets the force of the peer on the grip \[N\], in the axes of the device.
-    pub(super) fn want(&mut self, force: Triple) {
-        self.wanted = Some(Setpoint { force, at: self.driver.now() });
+    /// Sets the force on the hand, in the axes of the peer.
+    pub(super) fn want(&mut self, force: GatedForce) {
+        let along_axes = core::array::from_fn(|axis| force.newtons().get(axis).copied().unwrap_or(0.0));
+        self.wanted = Some(Setpoint { force: self.config.axes.to_device(along_axes), at: self.driver.now() });
     }
 
     pub(super) fn exchange(&mut self) -> Result<(), DriverError> {
@@ -194,11 +195,18 @@ impl Snapshot {
     }
 }
 
-/// Returns the state of a snapshot for the peer. A device that is not homed rests at its last position, and a reading that is too old has no velocity.
-pub(super) fn state<const A: usize>(snapshot: &Snapshot, config: &DeviceConfig<A>, last: State<A>) -> State<A> {
-    let Some(reading) = snapshot.reading else { return State { velocity: [0.0; A], ..last } };
+/// Returns the reading of a snapshot along the axes of the peer; `None` unless a peer may begin. A reading that is too old has no velocity.
+pub(super) fn reading<const A: usize>(snapshot: &Snapshot, config: &DeviceConfig<A>) -> Option<cohaptic_device::Reading> {
+    let reading = snapshot.reading.filter(|_| snapshot.is_ready())?;
     // The position of an old reading is still the best estimate; its velocity is not.
     let fresh = snapshot.at.saturating_duration_since(reading.at) <= config.driver.limits.reading_age;
     let velocity = if fresh { config.axes.of_device(reading.velocity) } else { [0.0; A] };
-    State { position: config.axes.of_device(reading.position), velocity }
+    // Axes beyond the axes of the peer are zero.
+    let widen = |values: [f64; A]| core::array::from_fn(|axis| values.get(axis).copied().unwrap_or(0.0));
+    Some(cohaptic_device::Reading { position: widen(config.axes.of_device(reading.position)), velocity: widen(velocity) })
+}
+
+/// Returns the description of a device with this configuration.
+pub(super) fn description<const A: usize>(config: &DeviceConfig<A>) -> Description {
+    Description { name: "falcon".to_owned(), motions: A, force: config.driver.limits.force, period: config.period }
 }

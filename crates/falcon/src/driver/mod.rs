@@ -16,6 +16,7 @@ pub use status::{Phase, Reading, Setpoint, Status};
 
 use core::time::Duration;
 
+use cohaptic_device::Stopper;
 use cohaptic_units::Instant;
 
 use crate::ftdi::{self, PAYLOAD};
@@ -294,7 +295,7 @@ impl<T: Transport> Driver<T> {
         self.homed_in_row >= self.config.homing_confirmations
     }
 
-    const fn phase(&self) -> Phase {
+    fn phase(&self) -> Phase {
         if self.gate.is_stopped() {
             Phase::Stopped
         } else if self.heard_at.is_none() {
@@ -340,6 +341,12 @@ impl<T: Transport> Driver<T> {
             let next = self.transport.now().saturating_add(BETWEEN_FAREWELLS);
             self.transport.sleep_until(next);
         }
+    }
+
+    /// Returns the handle that ends the force from any thread. After [`Stopper::stop`], no packet has a force; [`Driver::stop`] also tells the device.
+    #[must_use]
+    pub const fn stopper(&self) -> &Stopper {
+        self.gate.stopper()
     }
 
     /// Returns the status of the device after the last exchange.

@@ -1,9 +1,10 @@
 //! Force gate: from a wanted force to motor counts.
 
+use cohaptic_device::{Gate, Limits, LimitsError, Stopper};
 use cohaptic_units::Instant;
 
-use super::{Limits, LimitsError, MotorCounts};
-use crate::calibration::{Calibration, MOTOR_LIMIT};
+use super::MotorCounts;
+use crate::calibration::Calibration;
 use crate::kinematics::{Jacobian, Triple};
 
 /// State of the device at the time of a packet.
@@ -71,6 +72,20 @@ impl ZeroCause {
     }
 }
 
+impl From<cohaptic_device::ZeroCause> for ZeroCause {
+    fn from(cause: cohaptic_device::ZeroCause) -> Self {
+        match cause {
+            cohaptic_device::ZeroCause::Stopped => Self::Stopped,
+            cohaptic_device::ZeroCause::NotReady => Self::NotHomed,
+            cohaptic_device::ZeroCause::NotArmed => Self::NotArmed,
+            cohaptic_device::ZeroCause::StaleReading => Self::StaleReading,
+            cohaptic_device::ZeroCause::StaleSetpoint => Self::StaleSetpoint,
+            cohaptic_device::ZeroCause::LoopLate => Self::LoopLate,
+            cohaptic_device::ZeroCause::NotFinite => Self::NotFinite,
+        }
+    }
+}
+
 /// Changes of a force that went out.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Changes {
@@ -102,18 +117,14 @@ pub struct Admitted {
     pub verdict: Verdict,
 }
 
-/// The only source of [`MotorCounts`].
+/// Gate of a Falcon: the [`Gate`] of every device, and the torques of the force that it admits.
 ///
-/// A force passes if the device is homed, its report and the setpoint are fresh, the loop is on time, and every number is finite. Otherwise the force is zero
-/// at once. A passed force is shortened to the largest force, its change since the last force is shortened to the fastest change, and its torques are lowered
-/// if a motor would exceed its limit. After zero, the force grows from zero at most as fast as the limit of change allows.
-#[derive(Clone, Copy, PartialEq, Debug)]
+/// A force passes if the [`Gate`] admits it, and if torques can make the force at the position of the grip. The torques are lowered if a motor would exceed its
+/// limit.
+#[derive(Debug)]
 pub struct ForceGate {
-    limits: Limits,
+    gate: Gate,
     calibration: Calibration,
-    last: Triple,
-    last_at: Option<Instant>,
-    stopped: bool,
 }
 
 impl ForceGate {
@@ -123,105 +134,46 @@ impl ForceGate {
     ///
     /// [`LimitsError`] for a limit out of range.
     pub fn new(limits: Limits, calibration: Calibration) -> Result<Self, LimitsError> {
-        Ok(Self { limits: limits.checked()?, calibration, last: [0.0; 3], last_at: None, stopped: false })
+        Ok(Self { gate: Gate::new(limits, Stopper::default())?, calibration })
     }
 
     /// Stops the gate: every later force is zero. A stopped gate cannot be started again.
-    pub const fn stop(&mut self) {
-        self.stopped = true;
-        self.last = [0.0; 3];
+    pub fn stop(&mut self) {
+        self.gate.stop();
     }
 
     /// Returns whether the gate was stopped.
     #[must_use]
-    pub const fn is_stopped(&self) -> bool {
-        self.stopped
+    pub fn is_stopped(&self) -> bool {
+        self.gate.is_stopped()
+    }
+
+    /// Returns the handle that stops the gate from any thread.
+    #[must_use]
+    pub const fn stopper(&self) -> &Stopper {
+        self.gate.stopper()
     }
 
     /// Returns the force and the motor counts for the wanted force `wanted` \[N\]. Must be called once per packet, because the calls measure the time between
     /// packets.
     pub fn admit(&mut self, wanted: Triple, moment: &Moment) -> Admitted {
-        let since = self.last_at.map(|last| moment.now.saturating_duration_since(last));
-        // Also for a zero force: the gap is between packets, not between forces.
-        self.last_at = Some(moment.now);
-        match self.checked(wanted, moment, since.is_some_and(|since| since > self.limits.gap)) {
-            Err(cause) => {
-                // After zero, the limit of change starts from zero force.
-                self.last = [0.0; 3];
-                Admitted { force: [0.0; 3], motors: MotorCounts::ZERO, verdict: Verdict::Zero(cause) }
-            }
-            Ok(jacobian) => self.limited(wanted, &jacobian, since.map_or(0.0, |since| since.as_secs_f64())),
-        }
-    }
-
-    /// Returns the Jacobian at the grip, or the first reason for zero force.
-    fn checked(&self, wanted: Triple, moment: &Moment, late: bool) -> Result<Jacobian, ZeroCause> {
-        // An instant in the future is not fresh either: a clock that jumps back must not keep an old force.
-        let fresh = |at: Option<Instant>, age| at.and_then(|at| moment.now.checked_duration_since(at)).is_some_and(|passed| passed <= age);
-        let checks = [
-            (self.stopped, ZeroCause::Stopped),
-            (!moment.homed, ZeroCause::NotHomed),
-            (!moment.armed, ZeroCause::NotArmed),
-            (!fresh(moment.reading_at, self.limits.reading_age), ZeroCause::StaleReading),
-            (!fresh(moment.setpoint_at, self.limits.setpoint_age), ZeroCause::StaleSetpoint),
-            (late, ZeroCause::LoopLate),
-            (!wanted.iter().all(|part| part.is_finite()), ZeroCause::NotFinite),
-        ];
-        // The first failing check names the cause, so the order of `checks` is the order of `ZeroCause`.
-        if let Some((_, cause)) = checks.into_iter().find(|(fails, _)| *fails) {
-            return Err(cause);
-        }
-        moment.position.and_then(Jacobian::at).ok_or(ZeroCause::NoTorques)
-    }
-
-    /// Applies the limits of size, change and motors to a force that passed the checks.
-    fn limited(&mut self, wanted: Triple, jacobian: &Jacobian, passed: f64) -> Admitted {
-        let mut changes = Changes::default();
-        // Size first, then change: the change is measured to a force that is itself admissible.
-        let wanted = shortened(wanted, self.limits.force, &mut changes.limited);
-        // Both ends of the change lie in the ball of the largest force, and so do all points between them.
-        let change = core::array::from_fn(|axis| wanted[axis] - self.last[axis]);
-        let change = shortened(change, self.limits.slew * passed, &mut changes.slewed);
-        let force = core::array::from_fn(|axis| self.last[axis] + change[axis]);
-        let Some(motors) = self.counts(force, jacobian, &mut changes.saturated) else {
-            self.last = [0.0; 3];
-            return Admitted { force: [0.0; 3], motors: MotorCounts::ZERO, verdict: Verdict::Zero(ZeroCause::NoTorques) };
+        let Moment { now, homed, armed, reading_at, setpoint_at, position } = *moment;
+        let admitted = self.gate.admit(wanted, &cohaptic_device::Moment { now, ready: homed, armed, reading_at, setpoint_at });
+        let changes = match admitted.verdict {
+            cohaptic_device::Verdict::Zero(cause) => return Self::zero(cause.into()),
+            cohaptic_device::Verdict::Out(changes) => changes,
         };
-        self.last = force;
-        Admitted { force, motors, verdict: Verdict::Out(changes) }
+        let motors = position.and_then(Jacobian::at).and_then(|jacobian| MotorCounts::of(admitted.force, &jacobian, &self.calibration));
+        let Some((motors, saturated)) = motors else {
+            // Zero goes out in place of the admitted force, so the next force grows from zero.
+            self.gate.withdraw();
+            return Self::zero(ZeroCause::NoTorques);
+        };
+        let cohaptic_device::Changes { limited, slewed } = changes;
+        Admitted { force: admitted.force.newtons(), motors, verdict: Verdict::Out(Changes { limited, slewed, saturated }) }
     }
 
-    /// Returns the motor counts of a force; `None` for a force without torques.
-    fn counts(&self, force: Triple, jacobian: &Jacobian, saturated: &mut bool) -> Option<MotorCounts> {
-        // A positive count turns an arm backwards, hence the sign.
-        let counts = jacobian.torques(force)?.map(|torque| -self.calibration.counts_per_newton_metre() * torque);
-        let largest = counts.iter().fold(0.0_f64, |largest, count| largest.max(count.abs()));
-        let limit = f64::from(MOTOR_LIMIT);
-        *saturated = largest > limit;
-        // One factor for all motors keeps the direction of the force.
-        let scale = if *saturated { limit / largest } else { 1.0 };
-        counts.iter().all(|count| count.is_finite()).then(|| MotorCounts(counts.map(|count| whole(count * scale))))
+    const fn zero(cause: ZeroCause) -> Admitted {
+        Admitted { force: [0.0; 3], motors: MotorCounts::ZERO, verdict: Verdict::Zero(cause) }
     }
-}
-
-/// Returns the vector, shortened to the length `longest` if it is longer.
-fn shortened(vector: Triple, longest: f64, changed: &mut bool) -> Triple {
-    // Squares of finite components can overflow; hypot does not square them.
-    let length = libm::hypot(libm::hypot(vector[0], vector[1]), vector[2]);
-    if length <= longest {
-        return vector;
-    }
-    *changed = true;
-    if length.is_finite() {
-        vector.map(|part| part / length * longest)
-    } else {
-        // The components are finite, but the length overflows: a quarter of the vector has the same direction.
-        shortened(vector.map(|part| part * 0.25), longest, changed)
-    }
-}
-
-/// Rounds a count to the nearest integer within the limit of a motor.
-#[expect(clippy::cast_possible_truncation, reason = "clamped to what a motor takes")]
-fn whole(count: f64) -> i16 {
-    libm::rint(count).clamp(-f64::from(MOTOR_LIMIT), f64::from(MOTOR_LIMIT)) as i16
 }

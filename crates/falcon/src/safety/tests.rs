@@ -117,7 +117,7 @@ fn stopped_is_for_good() {
 
 #[test]
 fn limits_that_make_no_sense_are_refused() {
-    let refused = |limits: Limits| limits.checked().is_err();
+    let refused = |limits: Limits| ForceGate::new(limits, Calibration::DEFAULT).is_err();
     assert!(refused(Limits { force: f64::NAN, ..Limits::DEFAULT }) && refused(Limits { force: -1.0, ..Limits::DEFAULT }));
     assert!(refused(Limits { force: f64::INFINITY, ..Limits::DEFAULT }) && refused(Limits { slew: 0.0, ..Limits::DEFAULT }));
     assert!(refused(Limits { slew: f64::NAN, ..Limits::DEFAULT }) && refused(Limits { gap: Duration::ZERO, ..Limits::DEFAULT }));

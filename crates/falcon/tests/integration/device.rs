@@ -2,11 +2,11 @@
 
 use core::time::Duration;
 
+use cohaptic_device::{Device, Gate, GatedForce, Limits, Moment, Stopper};
 use cohaptic_falcon::device::{Axes, Axis, DeviceConfig, Ended, FalconDevice, SteppedFalcon};
 use cohaptic_falcon::driver::{DriverConfig, DriverError, Phase};
 use cohaptic_falcon::simulator::{SimulatedTransport, Simulator, SimulatorConfig, StillHand, Waypoints};
 use cohaptic_falcon::transport::TransportError;
-use cohaptic_peer::Device;
 use cohaptic_units::Instant;
 
 use crate::common::{MILLISECOND, running, seconds};
@@ -27,18 +27,35 @@ fn stepped<const A: usize>(axes: [Axis; A]) -> (SteppedFalcon<SimulatedTransport
     (falcon, simulator)
 }
 
-fn ticks<const A: usize>(falcon: &mut SteppedFalcon<SimulatedTransport, A>, count: u64, mut force: impl FnMut([f64; A]) -> [f64; A]) {
+/// Returns a wanted force on the hand \[N\] as a gate admits it that has asked for the force before: unchanged.
+fn admitted(force: [f64; 3]) -> GatedForce {
+    let mut gate = Gate::new(Limits { force: 20.0, slew: 1e6, ..Limits::DEFAULT }, Stopper::default()).unwrap();
+    let [_, second] = [0, 1].map(|millis| {
+        let now = Instant::from_nanos(millis * 1_000_000);
+        gate.admit(force, &Moment { now, ready: true, armed: true, reading_at: Some(now), setpoint_at: Some(now) }).force
+    });
+    assert_eq!(second.newtons(), force);
+    second
+}
+
+/// Runs ticks of a loop, with the force on the hand as a function of the position.
+fn ticks<const A: usize>(falcon: &mut SteppedFalcon<SimulatedTransport, A>, count: u64, force: impl Fn([f64; 3]) -> [f64; 3]) {
     for tick in 0..count {
-        let state = falcon.state();
-        assert!(state.is_finite());
-        falcon.advance(Instant::from_nanos(tick * 1_000_000), MILLISECOND, force(state.position));
+        let now = Instant::from_nanos(tick * 1_000_000);
+        let reading = falcon.read(now).unwrap_or_default();
+        assert!(reading.position.into_iter().chain(reading.velocity).all(f64::is_finite));
+        falcon.hold(now, MILLISECOND, admitted(force(reading.position)));
     }
 }
 
+fn position<const A: usize>(falcon: &mut SteppedFalcon<SimulatedTransport, A>) -> [f64; 3] {
+    falcon.read(Instant::ZERO).unwrap().position
+}
+
 #[test]
-fn the_grip_feels_the_coupling_force_with_the_opposite_sign() {
+fn the_grip_feels_the_held_force_along_the_axis_of_the_peer() {
     let (mut falcon, simulator) = stepped([Axis::Y]);
-    ticks(&mut falcon, 200, |_| [1.5]);
+    ticks(&mut falcon, 200, |_| [-1.5, 9.0, 9.0]);
     simulator.with(|device| {
         let [x, y, z] = device.motor_force();
         assert!((y + 1.5).abs() < 0.01, "{y}");
@@ -51,15 +68,15 @@ fn the_grip_feels_the_coupling_force_with_the_opposite_sign() {
 fn axes_that_nobody_uses_are_held_in_the_middle() {
     let (mut falcon, simulator) = stepped([Axis::X]);
     simulator.with(|device| device.set_hand(|_, _, _| [0.0, 0.8, -0.8]));
-    ticks(&mut falcon, 1500, |_| [0.0]);
+    ticks(&mut falcon, 1500, |_| [0.0; 3]);
     simulator.with(|device| {
         let [_, y, z] = device.position();
         // A force of 0.8 N on 500 N/m gives 1.6 mm. Dry friction of 0.2 N may hold 0.4 mm of the way in either direction.
         assert!(((y - 0.0016).abs() < 0.0005) && ((z - 0.125 + 0.0016).abs() < 0.0005), "{y} {z}");
         device.set_hand(|_, _, _| [0.8, 0.0, 0.0]);
     });
-    ticks(&mut falcon, 200, |_| [0.0]);
-    assert!(falcon.state().position[0] > 0.005, "the axis in use is free");
+    ticks(&mut falcon, 200, |_| [0.0; 3]);
+    assert!(position(&mut falcon)[0] > 0.005, "the axis in use is free");
 }
 
 #[test]
@@ -70,14 +87,14 @@ fn two_falcons_meet_at_an_object() {
     left_device.with(|device| device.set_hand(|_, place: [f64; 3], speed: [f64; 3]| hand([-0.01, 0.0, 0.125], place, speed)));
     right_device.with(|device| device.set_hand(|_, place: [f64; 3], speed: [f64; 3]| hand([0.01, 0.0, 0.125], place, speed)));
     for tick in 0..1500_u64 {
-        let (a, b) = (left.state(), right.state());
-        let force = [0, 1].map(|axis| 200.0 * (a.position[axis] - b.position[axis]));
+        let (a, b) = (position(&mut left), position(&mut right));
+        let force = [0, 1, 2].map(|axis| 200.0 * (b[axis] - a[axis]));
         let now = Instant::from_nanos(tick * 1_000_000);
-        left.advance(now, MILLISECOND, force);
-        right.advance(now, MILLISECOND, force.map(|part| -part));
+        left.hold(now, MILLISECOND, admitted(force));
+        right.hold(now, MILLISECOND, admitted(force.map(|part| -part)));
     }
     // With two springs of 100 N/m at the hands and 200 N/m between the grips, ±10 mm become ±2 mm, except for 0.2 N of friction on 500 N/m.
-    let (a, b) = (left.state().position[0], right.state().position[0]);
+    let (a, b) = (position(&mut left)[0], position(&mut right)[0]);
     assert!((a + 0.002).abs() < 0.0006 && (b - 0.002).abs() < 0.0006, "{a} {b}");
 }
 
@@ -86,24 +103,23 @@ fn hand(to: [f64; 3], place: [f64; 3], speed: [f64; 3]) -> [f64; 3] {
 }
 
 #[test]
-fn a_device_that_is_not_homed_rests_at_the_origin() {
+fn a_device_that_is_not_homed_has_no_reading_and_no_force() {
     let transport = SimulatedTransport::in_virtual_time(Simulator::new(running(), StillHand));
     let mut falcon = SteppedFalcon::start(transport, config([Axis::X, Axis::Y, Axis::Z])).unwrap();
-    ticks(&mut falcon, 300, |position| {
-        assert_eq!(position, [0.0; 3]);
-        [4.0; 3]
-    });
+    ticks(&mut falcon, 300, |_| [4.0; 3]);
+    assert_eq!(falcon.read(Instant::ZERO), None);
     assert_eq!((falcon.snapshot().phase, falcon.snapshot().force), (Phase::Homing, [0.0; 3]));
 }
 
 #[test]
-fn what_ends_the_driver_is_said_and_the_peer_goes_on() {
+fn what_ends_the_driver_is_said_and_the_loop_goes_on() {
     let (mut falcon, simulator) = stepped([Axis::Z]);
-    ticks(&mut falcon, 50, |_| [0.5]);
+    ticks(&mut falcon, 50, |_| [-0.5, 0.0, 0.0]);
     simulator.with(Simulator::unplug);
-    ticks(&mut falcon, 50, |_| [0.5]);
+    ticks(&mut falcon, 50, |_| [-0.5, 0.0, 0.0]);
     assert_eq!(falcon.ended(), Some(&DriverError::Transport(TransportError::Unplugged)));
     assert_eq!(falcon.wait(seconds(0.1)).unwrap_err(), DriverError::Transport(TransportError::Unplugged));
+    assert_eq!(falcon.read(Instant::ZERO), None);
 }
 
 /// Tests in real time, which assert only what a slow machine cannot change.
@@ -128,40 +144,54 @@ mod threaded {
         }
     }
 
-    #[test]
-    fn a_thread_drives_the_device_and_stops_it() {
-        let (mut falcon, simulator) = quick();
-        until(|| falcon.snapshot().is_some_and(|snapshot| snapshot.is_ready()));
-        // The state is latched: the thread goes on, and the state stays the same until the next `advance`.
-        falcon.advance(Instant::ZERO, MILLISECOND, [0.0]);
-        let state = falcon.state();
-        let turns = falcon.snapshot().unwrap().timing.turns;
-        until(|| falcon.snapshot().is_some_and(|snapshot| snapshot.timing.turns > turns + 20));
-        assert_eq!(falcon.state(), state);
-        // Force goes out while the peer renews it.
+    /// Asks for a force along z until the device gives the force.
+    fn push(falcon: &mut FalconDevice<1>) {
         until(|| {
-            falcon.advance(Instant::ZERO, MILLISECOND, [-1.0]);
+            falcon.hold(Instant::ZERO, MILLISECOND, admitted([1.0, 0.0, 0.0]));
             falcon.snapshot().is_some_and(|snapshot| snapshot.force[2] > 0.9)
         });
-        assert_eq!(falcon.ended(), None);
-        assert_eq!(falcon.stop(), Some(Ended::Stopped));
-        let last = falcon.snapshot().unwrap();
-        assert_eq!((last.phase, last.force, last.statistics.farewells), (Phase::Stopped, [0.0; 3], 5));
-        assert_eq!(simulator.with(|device| device.observed().largest_count_unhomed), 0);
-        // Calls of a peer after the stop have no effect.
-        falcon.advance(Instant::ZERO, MILLISECOND, [-1.0]);
-        assert!(falcon.state().is_finite());
     }
 
     #[test]
-    fn a_peer_that_stops_calling_ends_force() {
+    fn a_thread_drives_the_device_and_stops_it() {
+        let (mut falcon, simulator) = quick();
+        assert_eq!((falcon.description().name.as_str(), falcon.description().motions, falcon.description().force), ("falcon", 1, 4.0));
+        until(|| falcon.snapshot().is_some_and(|snapshot| snapshot.is_ready()));
+        assert!(falcon.read(Instant::ZERO).is_some());
+        // Force goes out while the session renews it.
+        push(&mut falcon);
+        assert_eq!(falcon.ended(), None);
+        assert_eq!(falcon.stop_and_wait(), Some(Ended::Stopped));
+        let last = falcon.snapshot().unwrap();
+        assert_eq!((last.phase, last.force, last.statistics.farewells), (Phase::Stopped, [0.0; 3], 5));
+        assert_eq!(simulator.with(|device| device.observed().largest_count_unhomed), 0);
+        // Calls of a session after the stop have no effect, and a second stop neither.
+        falcon.hold(Instant::ZERO, MILLISECOND, admitted([1.0, 0.0, 0.0]));
+        falcon.stop();
+        assert_eq!(falcon.read(Instant::ZERO), None);
+        assert_eq!(falcon.stop_and_wait(), Some(Ended::Stopped));
+    }
+
+    #[test]
+    fn a_session_that_stops_calling_ends_force() {
         let (mut falcon, _simulator) = quick();
-        until(|| {
-            falcon.advance(Instant::ZERO, MILLISECOND, [-1.0]);
-            falcon.snapshot().is_some_and(|snapshot| snapshot.force[2] > 0.9)
-        });
+        push(&mut falcon);
         until(|| falcon.snapshot().is_some_and(|snapshot| snapshot.force == [0.0; 3]));
         assert_eq!(falcon.ended(), None);
+    }
+
+    /// A panic of the session's thread drops the device.
+    #[test]
+    fn a_panic_beside_the_device_stops_it() {
+        let (mut falcon, simulator) = quick();
+        push(&mut falcon);
+        let stopper = falcon.stopper();
+        let panicked = std::thread::spawn(move || {
+            let _falcon = falcon;
+            panic!("in the loop");
+        });
+        assert!(panicked.join().is_err() && stopper.is_stopped());
+        simulator.with(|device| assert_eq!(device.motor_force(), [0.0; 3]));
     }
 
     #[test]
@@ -195,7 +225,7 @@ mod threaded {
 
 #[test]
 fn a_device_may_be_handed_to_another_thread() {
-    fn sent<D: Device<1> + Send>() {}
+    fn sent<D: Device>() {}
     sent::<FalconDevice<1>>();
     sent::<SteppedFalcon<SimulatedTransport, 1>>();
 }

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use cohaptic_peer::State;
+use cohaptic_device::{Description, Device, GatedForce, Reading, Stopper};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
@@ -12,7 +12,6 @@ use super::scene::LiveScene;
 use crate::observer::Observer;
 use crate::simulation::questions_of;
 use crate::summary::Summary;
-use crate::world::live::LiveDevice;
 
 /// Runs a scene with the inputs of a recorded session, as fast as possible. Fates and motion are those of the session, to the bit.
 ///
@@ -96,29 +95,39 @@ impl Questions {
 
 /// A device with recorded readings.
 struct Playback {
-    /// Instants and states of the readings still to come, in the order of time.
-    readings: VecDeque<(Instant, State<3>)>,
+    /// Readings still to come with their instants, in the order of time.
+    readings: VecDeque<(Instant, Reading)>,
 }
 
 impl Playback {
     fn of(inputs: &Inputs, place: usize) -> Self {
         let readings = inputs.rows.iter().filter_map(|(at, what)| match what {
-            Recorded::Device { peer, state: Some(state) } if *peer == place => Some((*at, *state)),
+            Recorded::Device { peer, state: Some(state) } if *peer == place => {
+                Some((*at, Reading { position: state.position, velocity: state.velocity }))
+            }
             Recorded::Device { .. } | Recorded::Sample { .. } | Recorded::Link { .. } | Recorded::End => None,
         });
         Self { readings: readings.collect() }
     }
 }
 
-impl LiveDevice for Playback {
-    fn read(&mut self, now: Instant) -> Option<State<3>> {
+impl Device for Playback {
+    fn description(&self) -> Description {
+        Description { name: "playback".to_owned(), motions: 0, force: 0.0, period: Duration::ZERO }
+    }
+
+    fn stopper(&self) -> Stopper {
+        Stopper::default()
+    }
+
+    fn read(&mut self, now: Instant) -> Option<Reading> {
         // Earlier readings were never due at a tick, as in a replay with a different scene, and are skipped.
         while self.readings.front().is_some_and(|(at, _)| *at < now) {
             self.readings.pop_front();
         }
         let due = self.readings.front().is_some_and(|(at, _)| *at == now);
-        due.then(|| self.readings.pop_front()).flatten().map(|(_, state)| state)
+        due.then(|| self.readings.pop_front()).flatten().map(|(_, reading)| reading)
     }
 
-    fn hold(&mut self, _now: Instant, _span: Duration, _coupling_force: [f64; 3]) {}
+    fn hold(&mut self, _now: Instant, _span: Duration, _force: GatedForce) {}
 }

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::time::Duration;
 
+use cohaptic_device::Device;
 use cohaptic_peer::State;
 use cohaptic_peer::coordination::BuiltInStrategy;
 use cohaptic_scene::{Axes, LinkKeys, Scene};
@@ -14,7 +15,7 @@ use crate::plan::{Model, Plan};
 use crate::rows::{Input, InputRow, SendRow};
 use crate::simulation::Simulation;
 use crate::summary::{Ending, Summary};
-use crate::world::live::{LiveDevice, Presence, RemotePeers, SampleError, SeatStats, Transmit, TurnState};
+use crate::world::live::{GateStats, Presence, RemotePeers, SampleError, SeatStats, Transmit, TurnState};
 use crate::world::{Step, Watch, World};
 
 const NANOSECOND: Duration = Duration::from_nanos(1);
@@ -78,12 +79,12 @@ impl LiveScene {
     ///
     /// If the scene has more than 23,170 peers; see [`crate::too_large`].
     #[must_use]
-    pub fn new(scene: &Scene, mut devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Self {
+    pub fn new(scene: &Scene, mut devices: impl FnMut(usize) -> Option<Box<dyn Device>>) -> Self {
         Self::with_devices(scene, &mut devices)
     }
 
     /// Like [`LiveScene::new`], compiled once here. With a generic closure, each crate with a session would compile the engine again.
-    fn with_devices(scene: &Scene, devices: &mut dyn FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Self {
+    fn with_devices(scene: &Scene, devices: &mut dyn FnMut(usize) -> Option<Box<dyn Device>>) -> Self {
         // The plan assumes an observer of everything, because each call may pass a different observer.
         let plan = Plan::new(scene, Model::Least, true);
         let simulation = Simulation::new(scene, Model::Least);
@@ -167,6 +168,13 @@ impl LiveScene {
         Ok(Some(at))
     }
 
+    /// Sets the time on the clock by which the driver calls, for the gates of devices in hands: age of a reading, pause of the loop and change of force are
+    /// those that the hand feels, also while late ticks are computed in quick succession. The clock changes no motion and no record. Without this call the
+    /// logical time is the clock.
+    pub fn set_clock(&mut self, clock: Instant) {
+        each!(&mut self.world, world => world.set_clock(clock));
+    }
+
     /// Computes everything due up to and including `now`.
     ///
     /// # Errors
@@ -236,6 +244,12 @@ impl LiveScene {
         each!(&self.world, world => world.seat_stats(peer))
     }
 
+    /// Returns the counters of the gate of a device in a hand; `None` for another peer, and for a device that is never present.
+    #[must_use]
+    pub fn gate_stats(&self, peer: usize) -> Option<GateStats> {
+        each!(&self.world, world => world.gate_stats(peer))
+    }
+
     /// Returns the counters of a link; `None` without such a link.
     #[must_use]
     pub fn link_stats(&self, from: usize, to: usize) -> Option<LinkStats> {
@@ -286,7 +300,7 @@ impl LiveScene {
     fn end(&mut self, ending: Ending) {
         self.ended = Some(ending);
         // No force of the session may remain on a hand after the end.
-        each!(&mut self.world, world => world.let_go(world.now()));
+        each!(&mut self.world, world => world.stop_devices(world.now()));
     }
 }
 

@@ -4,17 +4,19 @@ use std::convert::Infallible;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use cohaptic_harness::live::{LiveDevice, LiveScene, Presence};
+use cohaptic_device::{Description, Device, GatedForce, Reading, Stopper, ZeroCause};
+use cohaptic_harness::live::{LiveScene, Presence};
 use cohaptic_harness::{NoObserver, Observer, TickRow};
-use cohaptic_peer::State;
 use cohaptic_units::Instant;
 
 use crate::remote::millis;
 use crate::scenes::{Written, read};
 
 const COUPLING: f64 = 900.0;
+/// Greatest force of the device \[N\].
+const FORCE: f64 = 3.0;
 
-/// Forces \[N\] that a device was told to hold, with the instants.
+/// Forces on the hand \[N\] that a device was told to hold, with the instants.
 type HeldForces = Arc<Mutex<Vec<(Instant, [f64; 3])>>>;
 
 /// Device whose position follows a script, and which records the forces that it is told to hold.
@@ -22,15 +24,24 @@ struct Told {
     /// Position along x \[m\] at a millisecond; `None` while nobody holds the device.
     shows: fn(u64) -> Option<f64>,
     held: HeldForces,
+    stopper: Stopper,
 }
 
-impl LiveDevice for Told {
-    fn read(&mut self, now: Instant) -> Option<State<3>> {
-        (self.shows)(now.as_nanos() / 1_000_000).map(|x| State { position: [x, 99.0, 99.0], velocity: [0.0, 99.0, 99.0] })
+impl Device for Told {
+    fn description(&self) -> Description {
+        Description { name: "told".to_owned(), motions: 1, force: FORCE, period: Duration::from_millis(1) }
     }
 
-    fn hold(&mut self, now: Instant, _span: Duration, coupling_force: [f64; 3]) {
-        self.held.lock().unwrap().push((now, coupling_force));
+    fn stopper(&self) -> Stopper {
+        self.stopper.clone()
+    }
+
+    fn read(&mut self, now: Instant) -> Option<Reading> {
+        (self.shows)(now.as_nanos() / 1_000_000).map(|x| Reading { position: [x, 99.0, 99.0], velocity: [0.0, 99.0, 99.0] })
+    }
+
+    fn hold(&mut self, now: Instant, _span: Duration, force: GatedForce) {
+        self.held.lock().unwrap().push((now, force.newtons()));
     }
 }
 
@@ -52,6 +63,13 @@ fn duo_with(device: &str) -> Written {
 /// coordination force FT \[N\].
 #[derive(Default)]
 struct Forces(Vec<(Instant, f64, f64)>, Vec<f64>);
+
+impl Forces {
+    /// Returns the coupling force of the peer with the device at a tick \[N\].
+    fn computed(&self, tick: u64) -> f64 {
+        self.0[usize::try_from(tick).unwrap()].1
+    }
+}
 
 impl Observer for Forces {
     type Error = Infallible;
@@ -79,12 +97,24 @@ fn run_of(Written { scene, .. }: &Written, shows: fn(u64) -> Option<f64>) -> (Fo
     let device = Arc::clone(&held);
     let mut live = LiveScene::new(scene, |place| {
         assert_eq!(place, 1, "only the falcon has one");
-        Some(Box::new(Told { shows, held: Arc::clone(&device) }))
+        Some(Box::new(Told { shows, held: Arc::clone(&device), stopper: Stopper::default() }))
     });
     let mut forces = Forces::default();
     let Ok(()) = live.handle_timeout(millis(2500), &mut forces);
     let held = held.lock().unwrap().clone();
     (forces, held, live)
+}
+
+/// Asserts that a device was told at each millisecond to hold the opposite of the computed force \[N\], within the limits of the device. `None`: no reading.
+fn felt(held: &[(Instant, [f64; 3])], computed: impl Fn(u64) -> Option<f64>) {
+    let mut last = 0.0_f64;
+    for (tick, (at, [x, y, z])) in (0_u64..).zip(held) {
+        // At most 1 N in a millisecond, and nothing at the first tick, before which nothing is known.
+        let expected = computed(tick).map_or(0.0, |force| (-force).clamp(-FORCE, FORCE).clamp(last - 1.0, last + 1.0));
+        let expected = if tick == 0 { 0.0 } else { expected };
+        assert!(*at == millis(tick) && (x - expected).abs() < 1e-9 && (*y, *z) == (0.0, 0.0), "tick {tick}: {x} N, expected {expected} N");
+        last = *x;
+    }
 }
 
 #[test]
@@ -112,8 +142,14 @@ fn a_device_takes_hold_and_lets_go_little_by_little() {
         let bound = COUPLING * ((0.05 + x0.abs().max(x.abs()) + 0.1) / 250.0 + (x - x0).abs());
         assert!((f - f0).abs() <= bound + 1e-9, "tick {tick}, at {at}: from {f0} N to {f} N");
     }
-    // What is felt is what was computed, at the tick at which it was.
-    assert!(held.iter().zip(&forces.0).all(|((at, force), (tick, computed, _))| at == tick && *force == [*computed, 0.0, 0.0]));
+    // What is felt is what was computed, at the tick at which it was, as far as the gate admits it. A hand without a device feels nothing.
+    let there = |t: u64| (300..1000).contains(&t) || (1200..1900).contains(&t);
+    felt(&held, |t| there(t).then(|| forces.computed(t)));
+    assert!(held.iter().any(|(_, [x, ..])| (x - FORCE).abs() < 1e-9) && held.iter().any(|(_, [x, ..])| (x + FORCE).abs() < 1e-9));
+    let stats = live.gate_stats(1).unwrap();
+    let absent = stats.zeroed[ZeroCause::NotReady.index()];
+    assert_eq!((absent, stats.zeroed.iter().sum::<u64>()), (2501 - 1400, absent));
+    assert!(stats.limited > 100 && live.gate_stats(0).is_none());
     let at = |t: usize| forces.0[t];
     assert_eq!(at(299).1, 0.0);
     assert_eq!(at(300).1, 0.0);
@@ -138,30 +174,95 @@ fn read_at(millisecond: u64) -> f64 {
 #[test]
 fn a_slow_device_is_told_a_new_force_at_its_exchanges_alone() {
     let (forces, held, _) = run_of(&duo_with(", exchange-every = 4, exchange-age = 1"), |t| Some(read_at(t)));
+    let at_exchange = |tick: u64| forces.computed(tick / 4 * 4);
+    felt(&held, |tick| Some(at_exchange(tick)));
     let mut changes = 0;
-    for (tick, ((at, force), (_, computed, x))) in (0_u64..).zip(held.iter().zip(&forces.0)) {
-        let exchange = tick / 4 * 4;
-        assert_eq!((*at, force[0]), (millis(tick), forces.0[usize::try_from(exchange).unwrap()].1), "tick {tick}");
+    for (tick, (_, computed, x)) in (0_u64..).zip(&forces.0) {
         // The pull of a hand that has just taken hold is whole after a quarter of a second.
         if tick >= 300 {
             assert!((computed - COUPLING * (read_at(tick - 4) - x)).abs() < 1e-9, "tick {tick}: {computed} N");
-            changes += usize::from(tick > exchange && computed.to_bits() != force[0].to_bits());
+            changes += usize::from(computed.to_bits() != at_exchange(tick).to_bits());
         }
     }
     assert!(changes > 1000, "{changes}");
 }
 
+/// Position of a hand that goes to and fro between two places, each for 100 ms \[m\].
+fn to_and_fro(millisecond: u64) -> f64 {
+    if (millisecond / 100).is_multiple_of(2) { 0.05 } else { -0.05 }
+}
+
 #[test]
 fn a_session_that_ends_lets_go_of_every_device() {
+    let stopper = Stopper::default();
     let (_, held, mut live) = run(|_| Some(0.05));
     assert!(held.last().unwrap().1[0].abs() > 0.0);
     let Written { scene, .. } = duo();
     let held = Arc::new(Mutex::new(Vec::new()));
     let Ok(()) = live.stop(millis(2600), &mut NoObserver);
-    let mut live = LiveScene::new(&scene, |_| Some(Box::new(Told { shows: |_| Some(0.05), held: Arc::clone(&held) })));
+    let mut live = LiveScene::new(&scene, |_| Some(Box::new(Told { shows: |_| Some(0.05), held: Arc::clone(&held), stopper: stopper.clone() })));
     let Ok(()) = live.stop(millis(900), &mut NoObserver);
     assert_eq!(held.lock().unwrap().last(), Some(&(millis(900), [0.0; 3])));
-    let mut live = LiveScene::new(&scene, |_| Some(Box::new(Told { shows: |_| Some(0.05), held: Arc::clone(&held) })));
+    assert!(stopper.is_stopped());
+    let stopper = Stopper::default();
+    let mut live =
+        LiveScene::new(&scene, |_| Some(Box::new(Told { shows: |t| Some(to_and_fro(t)), held: Arc::clone(&held), stopper: stopper.clone() })));
+    let Ok(()) = live.handle_timeout(millis(2999), &mut NoObserver);
+    assert!(!stopper.is_stopped());
+    assert!(held.lock().unwrap().last().unwrap().1[0].abs() > 0.0, "{:?}", held.lock().unwrap().last());
     let Ok(()) = live.handle_timeout(millis(3000), &mut NoObserver);
     assert_eq!(held.lock().unwrap().last().unwrap().1, [0.0; 3]);
+    assert!(stopper.is_stopped());
+}
+
+/// The program of the session stops the device from another thread, and a panic of the loop drops the scene.
+#[test]
+fn stoppers_and_panics_stop_a_device() {
+    let Written { scene, .. } = duo();
+    let (held, stopper) = (Arc::new(Mutex::new(Vec::new())), Stopper::default());
+    let mut live = LiveScene::new(&scene, |_| Some(Box::new(Told { shows: |_| Some(0.05), held: Arc::clone(&held), stopper: stopper.clone() })));
+    let Ok(()) = live.handle_timeout(millis(900), &mut NoObserver);
+    let theirs = stopper.clone();
+    std::thread::spawn(move || theirs.stop()).join().unwrap();
+    let before = held.lock().unwrap().len();
+    let Ok(()) = live.handle_timeout(millis(1000), &mut NoObserver);
+    assert!(held.lock().unwrap()[before..].iter().all(|(_, force)| *force == [0.0; 3]));
+    assert_eq!(live.gate_stats(1).unwrap().zeroed[ZeroCause::Stopped.index()], 100);
+
+    let stopper = Stopper::default();
+    let mut live = LiveScene::new(&scene, |_| Some(Box::new(Told { shows: |_| Some(0.05), held: Arc::clone(&held), stopper: stopper.clone() })));
+    let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(move || {
+        let Ok(()) = live.handle_timeout(millis(100), &mut NoObserver);
+        panic!("in the loop");
+    }));
+    assert!(panicked.is_err() && stopper.is_stopped());
+}
+
+/// Ticks that come late are computed in quick succession. The hand feels the changes by the clock: zero after a pause of more than 20 ms, and no change while
+/// the clock stands.
+#[test]
+fn late_ticks_raise_the_force_by_the_clock() {
+    let Written { scene, .. } = duo();
+    let held: HeldForces = Arc::default();
+    let mut live =
+        LiveScene::new(&scene, |_| Some(Box::new(Told { shows: |t| Some(to_and_fro(t)), held: Arc::clone(&held), stopper: Stopper::default() })));
+    let last = || held.lock().unwrap().last().unwrap().1[0].abs();
+    for tick in 0..=510 {
+        live.set_clock(millis(tick));
+        let Ok(()) = live.handle_timeout(millis(tick), &mut NoObserver);
+    }
+    assert!((last() - FORCE).abs() < 1e-9, "{}", last());
+    // 20 ms late: the force stays.
+    live.set_clock(millis(530));
+    let Ok(()) = live.handle_timeout(millis(530), &mut NoObserver);
+    assert!((last() - FORCE).abs() < 1e-9, "{}", last());
+    // 30 ms late: 30 ticks by a clock that stands.
+    let before = held.lock().unwrap().len();
+    live.set_clock(millis(560));
+    let Ok(()) = live.handle_timeout(millis(560), &mut NoObserver);
+    assert_eq!(held.lock().unwrap()[before..].iter().filter(|(_, force)| *force == [0.0; 3]).count(), 30);
+    assert_eq!(live.gate_stats(1).unwrap().zeroed[ZeroCause::LoopLate.index()], 1);
+    live.set_clock(Instant::from_nanos(562_500_000));
+    let Ok(()) = live.handle_timeout(millis(562), &mut NoObserver);
+    assert!((last() - 2.5).abs() < 1e-9, "{}", last());
 }

@@ -3,9 +3,9 @@
 use std::convert::Infallible;
 use std::time::Duration;
 
-use cohaptic_harness::live::{LiveDevice, LiveScene, Presence};
+use cohaptic_device::{Description, Device, GatedForce, Reading, Stopper};
+use cohaptic_harness::live::{LiveScene, Presence};
 use cohaptic_harness::{Observer, TickRow};
-use cohaptic_peer::State;
 use cohaptic_units::Instant;
 
 use crate::records::{again, first_difference, session};
@@ -19,12 +19,20 @@ const FADE: f64 = 250.0;
 /// Pointer whose position along x \[m\] is a function of the millisecond; `None` while it holds nothing.
 struct Shown(fn(u64) -> Option<f64>);
 
-impl LiveDevice for Shown {
-    fn read(&mut self, now: Instant) -> Option<State<3>> {
-        (self.0)(now.as_nanos() / 1_000_000).map(|x| State { position: [x, 0.0, 0.0], velocity: [0.0; 3] })
+impl Device for Shown {
+    fn description(&self) -> Description {
+        Description { name: "pointer".to_owned(), motions: 1, force: 20.0, period: Duration::from_millis(1) }
     }
 
-    fn hold(&mut self, _now: Instant, _span: Duration, _coupling_force: [f64; 3]) {}
+    fn stopper(&self) -> Stopper {
+        Stopper::default()
+    }
+
+    fn read(&mut self, now: Instant) -> Option<Reading> {
+        (self.0)(now.as_nanos() / 1_000_000).map(|x| Reading { position: [x, 0.0, 0.0], velocity: [0.0; 3] })
+    }
+
+    fn hold(&mut self, _now: Instant, _span: Duration, _force: GatedForce) {}
 }
 
 /// Returns a scene of two peers. `hand` has further keys of the second peer, which a pointer pulls.

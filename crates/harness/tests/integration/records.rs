@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use cohaptic_harness::live::{Inputs, LiveDevice, LiveScene, Transmit, replay};
+use cohaptic_device::Device;
+use cohaptic_harness::live::{Inputs, LiveScene, Transmit, replay};
 use cohaptic_harness::record::{InputRecorder, Recorder};
 use cohaptic_harness::{Model, Simulation, Summary};
 use cohaptic_scene::{Scene, SceneContent};
@@ -32,7 +33,7 @@ fn files(folder: &Path) -> Files {
 /// Runs a session with all records. `drive` drives the session up to any instant, and the rest of the scene runs without inputs.
 pub(crate) fn session(
     scene: &Scene,
-    devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>,
+    devices: impl FnMut(usize) -> Option<Box<dyn Device>>,
     drive: impl FnOnce(&mut LiveScene, &mut Observing, &mut Vec<Transmit>),
 ) -> Session {
     let folder = tempfile::tempdir().unwrap();

@@ -1,7 +1,7 @@
 //! Replays of recorded sessions: the same bytes in virtual time, whatever the steps in which the driver of the session called.
 
-use cohaptic_harness::live::{LiveDevice, LiveScene, Transmit};
-use cohaptic_peer::State;
+use cohaptic_device::{Description, Device, GatedForce, Reading, Stopper};
+use cohaptic_harness::live::{LiveScene, Transmit};
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::option;
@@ -60,15 +60,23 @@ struct Moving {
     gone: Option<u64>,
 }
 
-impl LiveDevice for Moving {
-    fn read(&mut self, now: Instant) -> Option<State<3>> {
+impl Device for Moving {
+    fn description(&self) -> Description {
+        Description { name: "moving".to_owned(), motions: 1, force: 20.0, period: Duration::from_millis(1) }
+    }
+
+    fn stopper(&self) -> Stopper {
+        Stopper::default()
+    }
+
+    fn read(&mut self, now: Instant) -> Option<Reading> {
         let t = now.as_nanos() / 1_000_000;
         let there = self.gone.is_none_or(|gone| t < gone || t > gone + 14);
         let x = now.as_secs_f64().sin() / 7.0;
-        there.then_some(State { position: [x, x * x, -x], velocity: [1.0 / 7.0, 0.0, f64::MIN_POSITIVE] })
+        there.then_some(Reading { position: [x, x * x, -x], velocity: [1.0 / 7.0, 0.0, f64::MIN_POSITIVE] })
     }
 
-    fn hold(&mut self, _now: Instant, _span: Duration, _force: [f64; 3]) {}
+    fn hold(&mut self, _now: Instant, _span: Duration, _force: GatedForce) {}
 }
 
 /// Hands the events to a session. Between events, time passes in steps of `step` \[ns\]. With `punctual` the driver is never busy.
@@ -118,8 +126,8 @@ fn drive(written: &Written, events: &[Event], step: u64, punctual: bool, live: &
     live.handle_timeout(Instant::from_nanos(now), observer).unwrap();
 }
 
-fn devices(gone: Option<u64>) -> impl FnMut(usize) -> Option<Box<dyn LiveDevice>> {
-    move |_| Some(Box::new(Moving { gone }) as Box<dyn LiveDevice>)
+fn devices(gone: Option<u64>) -> impl FnMut(usize) -> Option<Box<dyn Device>> {
+    move |_| Some(Box::new(Moving { gone }) as Box<dyn Device>)
 }
 
 /// Returns a summary as text. Undetected flipped bits make some runs diverge, and a NaN in a summary is not equal to itself.

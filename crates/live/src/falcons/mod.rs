@@ -10,15 +10,15 @@ mod hand;
 use std::path::Path;
 use std::time::Duration;
 
+use cohaptic_device::{Device, Stopper};
 use cohaptic_falcon::boot::{self, BootError, BootOptions, Firmware, FirmwareError, Progress};
 use cohaptic_falcon::calibration::{Calibration, CalibrationError};
-use cohaptic_falcon::device::{Axes, Axis, DeviceConfig, FalconDevice, StartError, Stopper};
+use cohaptic_falcon::device::{Axes, Axis, DeviceConfig, FalconDevice, StartError};
 use cohaptic_falcon::driver::DriverConfig;
 use cohaptic_falcon::safety::Limits;
 use cohaptic_falcon::simulator::{MechanicsConfig, SimulatedTransport, Simulator, SimulatorConfig};
 use cohaptic_falcon::transport::{Transport, TransportError};
 use cohaptic_falcon::usb::{UsbError, UsbTransport};
-use cohaptic_harness::live::LiveDevice;
 use cohaptic_realtime::{Wishes, prepare_thread};
 use cohaptic_scene::{FalconDevice as Which, FalconSpec, PeerKind, PeerSpec, Scene};
 
@@ -125,7 +125,7 @@ impl Falcons {
     }
 
     /// Removes the Falcon of a peer and returns the Falcon as the session's device. Returns `None` if the peer has no Falcon, or the Falcon was taken before.
-    pub fn take(&mut self, peer: usize) -> Option<Box<dyn LiveDevice>> {
+    pub fn take(&mut self, peer: usize) -> Option<Box<dyn Device>> {
         Some(match self.devices.get_mut(peer)?.take()? {
             AnyAttached::One(device) => Box::new(device),
             AnyAttached::Two(device) => Box::new(device),

@@ -32,6 +32,7 @@ impl Driven for Session {
         let Self { outside, live, watch, clock, is_stopped, .. } = self;
         // Before a sample is handed over, the scene handles the ticks due before the sample. The lateness of these ticks counts up to now.
         watch.woken = now;
+        live.set_clock(now);
         let Some(outside) = outside else { return Ok(Received { count: 0, until: now }) };
         let count = outside.receive(clock, |at, peer, sample| {
             if !*is_stopped {
@@ -52,6 +53,8 @@ impl Driven for Session {
     fn handle_timeout(&mut self, now: Instant) -> bool {
         // The tick is handled with its deadline as instant, not with `now`: the lateness must not change the motion.
         if let Some(due) = self.live.poll_timeout().filter(|due| *due <= now && !self.is_stopped) {
+            // The gates of devices in hands go by the clock: the hand feels how late the tick is.
+            self.live.set_clock(now);
             let passed = self.live.handle_timeout(due, &mut self.watch);
             self.note(passed);
         }

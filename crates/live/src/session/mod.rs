@@ -18,7 +18,8 @@ mod watch;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use cohaptic_harness::live::{LiveDevice, LiveScene};
+use cohaptic_device::Device;
+use cohaptic_harness::live::LiveScene;
 use cohaptic_realtime::{Clock as _, Driven as _, MonotonicClock, Schedule, drive, prepare_thread};
 use cohaptic_scene::{LinkKeys, Scene};
 use cohaptic_units::Instant;
@@ -104,7 +105,7 @@ impl Session {
     /// # Panics
     ///
     /// If the scene is [`cohaptic_harness::too_large`].
-    pub fn open(scene: &Scene, config: SessionConfig, devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Result<Self, SessionError> {
+    pub fn open(scene: &Scene, config: SessionConfig, devices: impl FnMut(usize) -> Option<Box<dyn Device>>) -> Result<Self, SessionError> {
         let outside = Outside::open(scene, &config)?;
         let recording = config.out.as_deref().map(|folder| Recording::create(folder, scene, config.content.clone(), config.recorded)).transpose()?;
         let peers = scene.peers.len();
@@ -146,6 +147,7 @@ impl Session {
             validity: self.validity(),
             behind,
             seats: (0..self.peers).map(|peer| self.live.seat_stats(peer)).collect(),
+            gates: (0..self.peers).map(|peer| self.live.gate_stats(peer)).collect(),
             admission: self.outside.as_ref().map(Outside::counts),
             prepared,
             files,
@@ -193,6 +195,7 @@ impl Session {
         }
         // `stop` handles everything due until `now` first. Afterwards there is no deadline, and `is_over` ends the loop.
         if !conductor.keep_going() {
+            self.live.set_clock(now);
             self.live.stop(now, &mut self.watch)?;
             return Ok(());
         }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use cohaptic_harness::Summary;
-use cohaptic_harness::live::{PeerState, SeatStats};
+use cohaptic_harness::live::{GateStats, PeerState, SeatStats};
 use cohaptic_harness::measures::MeasuredValue;
 use cohaptic_harness::record::RecordedPicture;
 use cohaptic_harness::task::TaskResult;
@@ -83,6 +83,8 @@ pub struct Report {
     pub behind: Duration,
     /// Counts of the samples and readings received, indexed by peer. `None` for a simulated peer.
     pub seats: Vec<Option<SeatStats>>,
+    /// Forces that the gate of a device changed or made zero, indexed by peer. `None` for a peer without a device or pointer.
+    pub gates: Vec<Option<GateStats>>,
     /// Counts of the admission and of its socket. `None` in a scene without peers in other programs.
     pub admission: Option<(AdmissionStats, SocketCounts)>,
     /// Wishes that the system granted and refused.

@@ -10,6 +10,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use cohaptic_device::{Description, Device, GatedForce, Reading, Stopper};
 use cohaptic_falcon::calibration::Calibration;
 use cohaptic_falcon::device::{Axes, Axis, DeviceConfig, SteppedFalcon};
 use cohaptic_falcon::driver::DriverConfig;
@@ -17,9 +18,8 @@ use cohaptic_falcon::safety::Limits;
 use cohaptic_falcon::simulator::{MechanicsConfig, SharedSimulator, SimulatedTransport, Simulator, SimulatorConfig, Waypoints};
 use cohaptic_falcon::transport::Request;
 use cohaptic_falcon::transport::{Transport, TransportError};
-use cohaptic_harness::live::{LiveDevice, LiveScene};
+use cohaptic_harness::live::LiveScene;
 use cohaptic_harness::{Model, Observer, Simulation, TickRow};
-use cohaptic_peer::{Device as _, State};
 use cohaptic_scene::{PeerKind, Scene};
 use cohaptic_units::Instant;
 
@@ -79,13 +79,25 @@ struct Stepped {
     largest: Arc<Mutex<f64>>,
 }
 
-impl LiveDevice for Stepped {
-    fn read(&mut self, _now: Instant) -> Option<State<3>> {
-        self.falcon.snapshot().is_ready().then(|| self.falcon.state())
+impl Device for Stepped {
+    fn description(&self) -> Description {
+        self.falcon.description()
     }
 
-    fn hold(&mut self, now: Instant, span: Duration, coupling_force: [f64; 3]) {
-        self.falcon.advance(now, span, coupling_force);
+    fn stopper(&self) -> Stopper {
+        self.falcon.stopper()
+    }
+
+    fn read(&mut self, now: Instant) -> Option<Reading> {
+        self.falcon.read(now)
+    }
+
+    fn stop(&mut self) {
+        self.falcon.stop();
+    }
+
+    fn hold(&mut self, now: Instant, span: Duration, force: GatedForce) {
+        self.falcon.hold(now, span, force);
         let mut largest = self.largest.lock().unwrap();
         *largest = largest.max(length(self.falcon.snapshot().force));
     }

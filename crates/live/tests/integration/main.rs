@@ -4,6 +4,7 @@
 
 mod client;
 mod conversation;
+mod ends;
 mod examples;
 mod falcons;
 mod floods;

@@ -5,7 +5,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant as Clock};
 
-use cohaptic_harness::live::LiveDevice;
+use cohaptic_device::Device;
 use cohaptic_live::pointers::Pointer;
 use cohaptic_study::{Fault, RoundTrip};
 
@@ -99,7 +99,7 @@ impl Hand {
 
     /// Begins a trial at the instant `now`, and returns the pointer as a device of the trial's session. The pointer is new, because each trial begins at the
     /// same place.
-    pub(super) fn begin(&self, now: Clock) -> Box<dyn LiveDevice> {
+    pub(super) fn begin(&self, now: Clock) -> Box<dyn Device> {
         self.was_lost.store(!self.is_connected(), Ordering::Relaxed);
         self.was_hidden.store(self.is_hidden(), Ordering::Relaxed);
         lock(&self.trips).clear();

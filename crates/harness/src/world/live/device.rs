@@ -2,23 +2,12 @@
 
 use std::time::Duration;
 
+use cohaptic_device::Reading;
 use cohaptic_peer::{Age, Device, RestingDevice, State};
 use cohaptic_units::Instant;
 
+use super::gated::{GateStats, GatedDevice};
 use super::pulled::PulledDevice;
-
-/// Device of a person in a live session, or pointer of a simulated device. Components beyond the axes of the scene are zero and are ignored.
-pub trait LiveDevice: Send {
-    /// Returns position \[m\] and velocity \[m/s\] at the tick at `now`, in the coordinates of the scene; for a peer of kind `pointer`, position and velocity
-    /// of the pointer. Called once a tick. Returns `None` if there is no device, or if the device does not answer or is not homed.
-    ///
-    /// A peer with a long silent device lets go of the object gradually, and takes the object up again gradually after the return of the device.
-    fn read(&mut self, now: Instant) -> Option<State<3>>;
-
-    /// Applies the force FC \[N\] until the next tick, `span` after `now`. The hand feels FC with the opposite sign. Called once a tick, after
-    /// [`LiveDevice::read`], and with zero forces when the session ends.
-    fn hold(&mut self, now: Instant, span: Duration, coupling_force: [f64; 3]);
-}
 
 /// Device without a simulation.
 #[derive(Debug)]
@@ -53,7 +42,7 @@ impl<const A: usize> Device<A> for UnsimulatedDevice<A> {
 
 /// Device of a peer, at the state read last.
 pub(crate) struct HandDevice<const A: usize> {
-    device: Option<Box<dyn LiveDevice>>,
+    device: Option<GatedDevice>,
     /// State read last.
     read: State<A>,
     /// Shown state at the return of the device. The shown state moves from `before` to `read`.
@@ -66,22 +55,24 @@ pub(crate) struct HandDevice<const A: usize> {
 
 impl<const A: usize> HandDevice<A> {
     /// Returns a device at rest at `state`. `None` for a never present device.
-    pub(crate) const fn new(device: Option<Box<dyn LiveDevice>>, state: State<A>) -> Self {
+    pub(crate) const fn new(device: Option<GatedDevice>, state: State<A>) -> Self {
         Self { device, read: state, before: state, share: 1.0, pulled: None }
     }
 
     /// Returns a simulated device pulled by a pointer. `None` for a pointer without readings.
-    pub(crate) fn pulling(pointer: Option<Box<dyn LiveDevice>>, pulled: PulledDevice<A>) -> Self {
+    pub(crate) fn pulling(pointer: Option<GatedDevice>, pulled: PulledDevice<A>) -> Self {
         let state = pulled.state();
         Self { pulled: Some(pulled), ..Self::new(pointer, state) }
     }
 
-    /// Reads the device along the axes of the scene. Returns `None` if there is no reading, or if a number is not finite.
-    pub(crate) fn read(&mut self, now: Instant, axes: usize) -> Option<State<A>> {
-        let State { position, velocity } = self.device.as_mut()?.read(now)?;
+    /// Reads the device along the axes of the scene, at the time `clock` of the clock of the session. Returns `None` if there is no reading, or if a number is
+    /// not finite.
+    pub(crate) fn read(&mut self, now: Instant, clock: Instant, axes: usize) -> Option<State<A>> {
         // A scene of two axes is simulated along three, and the third axis rests.
         let first = |values: [f64; 3]| core::array::from_fn(|axis| values.get(axis).copied().filter(|_| axis < axes).unwrap_or(0.0));
-        Some(State { position: first(position), velocity: first(velocity) }).filter(State::is_finite)
+        self.device.as_mut()?.read(now, clock, |Reading { position, velocity }| {
+            Some(State { position: first(position), velocity: first(velocity) }).filter(State::is_finite)
+        })
     }
 
     /// Stores a reading.
@@ -118,10 +109,16 @@ impl<const A: usize> HandDevice<A> {
         }
     }
 
-    pub(crate) fn let_go(&mut self, now: Instant) {
+    /// Stops the device at the end of the session.
+    pub(crate) fn stop(&mut self, now: Instant) {
         if let Some(device) = &mut self.device {
-            device.hold(now, Duration::ZERO, [0.0; 3]);
+            device.stop(now);
         }
+    }
+
+    /// Returns the counts of the gate; `None` for a never present device.
+    pub(crate) fn gate_stats(&self) -> Option<&GateStats> {
+        self.device.as_ref().map(GatedDevice::stats)
     }
 }
 
@@ -137,7 +134,8 @@ impl<const A: usize> Device<A> for HandDevice<A> {
             pulled.advance(now, span, &wanted, coupling_force);
         }
         if let Some(device) = &mut self.device {
-            device.hold(now, span, core::array::from_fn(|axis| coupling_force.get(axis).copied().unwrap_or(0.0)));
+            // The coupling force acts on the copy, and with the opposite sign on the hand.
+            device.hold(now, span, core::array::from_fn(|axis| -coupling_force.get(axis).copied().unwrap_or(0.0)));
         }
     }
 }
@@ -150,27 +148,39 @@ impl<const A: usize> core::fmt::Debug for HandDevice<A> {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_device::{Description, GatedForce, Stopper};
+
     use super::*;
 
-    /// A device with a constant state.
-    struct Fixed(State<3>);
+    /// A device with a constant reading.
+    struct Fixed(Reading);
 
-    impl LiveDevice for Fixed {
-        fn read(&mut self, _now: Instant) -> Option<State<3>> {
+    impl cohaptic_device::Device for Fixed {
+        fn description(&self) -> Description {
+            Description { name: "fixed".to_owned(), motions: 0, force: 0.0, period: Duration::from_millis(1) }
+        }
+
+        fn stopper(&self) -> Stopper {
+            Stopper::default()
+        }
+
+        fn read(&mut self, _now: Instant) -> Option<Reading> {
             Some(self.0)
         }
 
-        fn hold(&mut self, _now: Instant, _span: Duration, _coupling_force: [f64; 3]) {}
+        fn hold(&mut self, _now: Instant, _span: Duration, _force: GatedForce) {}
     }
 
     /// A scene of two axes is simulated along three. A moving third axis would change the run, but has no column in the record.
     #[test]
     fn components_beyond_the_axes_of_the_scene_are_not_looked_at() {
         for beyond in [3.0, f64::NAN] {
-            let shown = State { position: [1.0, 2.0, beyond], velocity: [4.0, 5.0, beyond] };
-            let mut device = HandDevice::<3>::new(Some(Box::new(Fixed(shown))), State::REST);
-            assert_eq!(device.read(Instant::ZERO, 2), Some(State { position: [1.0, 2.0, 0.0], velocity: [4.0, 5.0, 0.0] }));
-            assert_eq!(device.read(Instant::ZERO, 3).is_some(), beyond.is_finite());
+            let shown = Reading { position: [1.0, 2.0, beyond], velocity: [4.0, 5.0, beyond] };
+            let fixed = GatedDevice::new(Box::new(Fixed(shown)), Duration::from_millis(1));
+            let mut device = HandDevice::<3>::new(Some(fixed), State::REST);
+            let expected = Some(State { position: [1.0, 2.0, 0.0], velocity: [4.0, 5.0, 0.0] });
+            assert_eq!(device.read(Instant::ZERO, Instant::ZERO, 2), expected);
+            assert_eq!(device.read(Instant::ZERO, Instant::ZERO, 3).is_some(), beyond.is_finite());
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod device;
 mod fade;
+mod gated;
 mod presence;
 mod pulled;
 mod seat;
@@ -21,10 +22,11 @@ use crate::rows::{Input, InputRow};
 use crate::schedule::Schedule;
 
 use device::{HandDevice, UnsimulatedDevice};
+use gated::GatedDevice;
 use pulled::PulledDevice;
 use seat::Seat;
 
-pub use device::LiveDevice;
+pub use gated::GateStats;
 pub(crate) use presence::RemotePeers;
 pub use presence::{Datagram, Transmit};
 pub use seat::{Presence, SampleError, SeatStats};
@@ -40,7 +42,7 @@ pub struct TurnState {
 
 impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
     /// Returns the scene before its first instant with all remote peers absent. `devices` gives the device in the hand at the given index of a peer.
-    pub(crate) fn seated(mut self, scene: &Scene, mut devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Self {
+    pub(crate) fn seated(mut self, scene: &Scene, mut devices: impl FnMut(usize) -> Option<Box<dyn cohaptic_device::Device>>) -> Self {
         // A peer in another process ticks there. The schedule holds the peers of this process only.
         self.ticking.retain(|place| !self.remote.is_process(*place));
         let here = |place: &usize| &scene.peers[*place];
@@ -52,6 +54,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
             self.network = self.network.awaiting(processes.map(NodeId::new));
         }
         for (place, (peer, member)) in scene.peers.iter().zip(&mut self.members).enumerate() {
+            let mut device = || devices(place).map(|device| GatedDevice::new(device, peer.clock.spans().1));
             match peer.kind {
                 PeerKind::Udp(_) => {
                     // The world never sends for this peer, and its unknown position is left out of the discrepancy.
@@ -60,13 +63,13 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
                 }
                 PeerKind::Falcon(..) => {
                     let state = member.peer.device().state();
-                    let hand = Box::new(HandDevice::new(devices(place), state));
+                    let hand = Box::new(HandDevice::new(device(), state));
                     *member.peer.device_mut() = DeviceModel::Unsimulated(UnsimulatedDevice::InHand(hand));
                 }
                 PeerKind::Pointer(_, arm) => {
                     // A pointer pulls a simulated device, so the peer keeps a body with mass and damping.
                     let body = SimulatedDevice::new(peer.device, None, member.peer.device().state(), scene.integrator, &peer.clock);
-                    let hand = Box::new(HandDevice::pulling(devices(place), PulledDevice::new(body, arm)));
+                    let hand = Box::new(HandDevice::pulling(device(), PulledDevice::new(body, arm)));
                     *member.peer.device_mut() = DeviceModel::Unsimulated(UnsimulatedDevice::InHand(hand));
                 }
                 PeerKind::Simulated => {}
@@ -186,11 +189,11 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         self.remote.undrained = Some(at);
     }
 
-    /// Ends all forces on devices in hands: no hand feels a force of the session after `now`.
-    pub(crate) fn let_go(&mut self, now: Instant) {
+    /// Stops all devices in hands: no hand feels a force of the session after `now`.
+    pub(crate) fn stop_devices(&mut self, now: Instant) {
         for member in &mut self.members {
             if let Some(device) = member.peer.device_mut().hand_mut() {
-                device.let_go(now);
+                device.stop(now);
             }
         }
     }
@@ -209,6 +212,17 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
 
     pub(crate) fn seat_stats(&self, place: usize) -> Option<SeatStats> {
         self.remote.seat(place).map(|seat| seat.stats)
+    }
+
+    /// Sets the time on the clock of the session, by which the gates of devices in hands judge ages and changes. See [`crate::live::LiveScene::set_clock`].
+    pub(crate) const fn set_clock(&mut self, clock: Instant) {
+        self.remote.clock = clock;
+    }
+
+    /// Returns the counts of the gate of a device in a hand; `None` for another peer, and for a device that is never present.
+    pub(crate) fn gate_stats(&self, place: usize) -> Option<GateStats> {
+        let DeviceModel::Unsimulated(UnsimulatedDevice::InHand(device)) = self.members.get(place)?.peer.device() else { return None };
+        device.gate_stats().copied()
     }
 
     pub(crate) fn note_late(&mut self, place: usize, by: std::time::Duration) {
@@ -303,8 +317,10 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
         axes: usize,
         observer: &mut (impl Observer<Error = Ended> + ?Sized),
     ) -> Result<(), Ended> {
+        let clock = self.clock;
         if let (Some(device), Some(seat)) = (peer.device_mut().hand_mut(), self.seat_mut(place)) {
-            let read = device.read(now, axes);
+            // In virtual time nobody sets the clock, and the logical time is the clock.
+            let read = device.read(now, clock.max(now), axes);
             // Every reading is recorded, a missing reading too: a replay must see the same silences.
             observer.on_input(&InputRow { at: now, what: Input::Device { peer: place, state: read.as_ref().map(|state| row(state, axes)) } })?;
             if let Some(state) = read {

@@ -60,6 +60,8 @@ pub(crate) struct RemotePeers<const A: usize> {
     told: Vec<Option<Age>>,
     /// Datagrams for other processes, in the order of arrival.
     outbox: VecDeque<Transmit>,
+    /// Time on the clock of the session, which may be ahead of the logical time.
+    pub(crate) clock: Instant,
     /// `true` if any peer is in another process.
     pub(crate) has_processes: bool,
     /// Index of the first local peer.
@@ -78,7 +80,7 @@ impl<const A: usize> RemotePeers<A> {
         // Without any local peer nothing ticks here, and the index is never used.
         let lead = seats.iter().position(|seat| seat.as_ref().is_none_or(|seat| !seat.is_process)).unwrap_or(0);
         let (ages, told) = (vec![Ages::default(); peers], vec![None; peers * peers]);
-        Self { seats, places, ages, told, outbox: VecDeque::new(), has_processes, lead, undrained: None }
+        Self { seats, places, ages, told, outbox: VecDeque::new(), clock: Instant::ZERO, has_processes, lead, undrained: None }
     }
 
     pub(crate) fn seat(&self, place: usize) -> Option<&Seat> {

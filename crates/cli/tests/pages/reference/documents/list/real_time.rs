@@ -7,6 +7,7 @@ pub(super) const REAL_TIME: [Document; 7] = [
         command: "live",
         lines: &[
             "cohaptic live scenarios/live/two-and-a-program.toml --set measure.names=all --for 50ms --listen 127.0.0.1:0 --no-priority --json",
+            "cohaptic live scenarios/live/three-falcons.toml --for 50ms --no-priority --json",
             "cohaptic live scenarios/tasks/hold.toml --set task.fail.force=0.001 --for 50ms --no-priority --json",
         ],
         rows: &[
@@ -24,6 +25,8 @@ pub(super) const REAL_TIME: [Document; 7] = [
                 "of peers elsewhere: samples taken, joinings, samples refused and out of order",
             ),
             ("peers[].seat.late, peers[].seat.most_late_us", "late samples, counted at the next instant; the largest lateness"),
+            ("peers[].gate.zeroed.NAME", "of devices and pointers: ticks without force on the hand, by cause (docs/extending.md)"),
+            ("peers[].gate.limited, peers[].gate.slewed", "ticks at which the force on the hand was shortened, and its change"),
             ("link_totals.NAME, link_quantiles.NAME, links[].from, links[].to, links[].@Counters, access_lines", "as of a run"),
             ("door.address, door.handled", "with other programs: where it listens; `handled` = `admitted` + `welcomed` + all of `refused`"),
             ("door.admitted, door.welcomed, door.refused.NAME", "datagrams; refused ones [by cause](live-protocol.md#why-a-datagram-is-refused)"),

@@ -1,0 +1,99 @@
+//! Device in a person's hand, with the gate of the session.
+
+use std::time::Duration;
+
+use cohaptic_device::{Device, Gate, GatedForce, Limits, Moment, Reading, Verdict, ZeroCause};
+use cohaptic_units::Instant;
+
+/// Forces of the session that a gate changed or made zero, since the start.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct GateStats {
+    /// Forces that became zero, indexed as in [`ZeroCause::ALL`].
+    pub zeroed: [u64; ZeroCause::ALL.len()],
+    /// Forces shortened to the greatest force of the device.
+    pub limited: u64,
+    /// Forces with a change shortened to the fastest change.
+    pub slewed: u64,
+}
+
+impl GateStats {
+    /// Returns the causes for which forces became zero, with their numbers, in the order of the checks.
+    pub fn causes(&self) -> impl Iterator<Item = (ZeroCause, u64)> + use<> {
+        ZeroCause::ALL.into_iter().zip(self.zeroed).filter(|(_, count)| *count > 0)
+    }
+
+    fn count(&mut self, verdict: Verdict) {
+        match verdict {
+            Verdict::Zero(cause) => self.zeroed[cause.index()] += 1,
+            Verdict::Out(changes) => {
+                self.limited += u64::from(changes.limited);
+                self.slewed += u64::from(changes.slewed);
+            }
+        }
+    }
+}
+
+/// Device and its gate. The device is stopped when the session ends, and when this value is dropped, also by a panic.
+pub(crate) struct GatedDevice {
+    device: Box<dyn Device>,
+    gate: Gate,
+    stats: GateStats,
+    /// Time of the present tick on the clock of the session.
+    clock: Instant,
+    /// Time of the last reading on the clock of the session.
+    reading_at: Option<Instant>,
+    /// `true` if the device was read at the present tick.
+    is_read: bool,
+}
+
+impl GatedDevice {
+    /// Returns a device that is read every `tick`.
+    pub(crate) fn new(device: Box<dyn Device>, tick: Duration) -> Self {
+        // A scene may tick more slowly than the pause that stops the force of a fast loop. The bound of a second is the greatest that a gate takes.
+        let gap = tick.saturating_mul(2).clamp(Limits::DEFAULT.gap, Duration::from_secs(1));
+        let limits = |force| Limits { force, gap, ..Limits::DEFAULT };
+        let gate = Gate::new(limits(device.description().force), device.stopper());
+        // A description that is out of range gives a device without force.
+        let gate = gate.or_else(|_| Gate::new(limits(0.0), device.stopper())).expect("the other limits are within their ranges");
+        Self { device, gate, stats: GateStats::default(), clock: Instant::ZERO, reading_at: None, is_read: false }
+    }
+
+    /// Reads the device at the tick at `now`. `clock`: the time on the clock of the session, not before `now`. `sound` returns the usable part of a reading, or
+    /// `None` for a reading that is not usable, which counts as none.
+    pub(crate) fn read<T>(&mut self, now: Instant, clock: Instant, sound: impl FnOnce(Reading) -> Option<T>) -> Option<T> {
+        let read = self.device.read(now).and_then(sound);
+        (self.clock, self.is_read) = (clock, read.is_some());
+        if self.is_read {
+            self.reading_at = Some(clock);
+        }
+        read
+    }
+
+    /// Applies a force \[N\] on the hand until the next tick, as far as the gate admits the force. A device without a reading at this tick gives no force.
+    pub(crate) fn hold(&mut self, now: Instant, span: Duration, wanted: [f64; 3]) {
+        let Self { clock, is_read, reading_at, .. } = *self;
+        // The device returns no reading if the user has not switched forces on, so a read device is armed.
+        let moment = Moment { now: clock, ready: is_read, armed: is_read, reading_at, setpoint_at: Some(clock) };
+        let admitted = self.gate.admit(wanted, &moment);
+        self.stats.count(admitted.verdict);
+        self.device.hold(now, span, admitted.force);
+    }
+
+    /// Ends the force of the session for good.
+    pub(crate) fn stop(&mut self, now: Instant) {
+        // Zero force first: a device without a thread has nobody else to send it.
+        self.device.hold(now, Duration::ZERO, GatedForce::ZERO);
+        self.gate.stop();
+        self.device.stop();
+    }
+
+    pub(crate) const fn stats(&self) -> &GateStats {
+        &self.stats
+    }
+}
+
+impl Drop for GatedDevice {
+    fn drop(&mut self) {
+        self.device.stop();
+    }
+}
