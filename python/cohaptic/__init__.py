@@ -24,6 +24,7 @@ from cohaptic.errors import AnalysisError, CohapticError, SceneError, Unreadable
 from cohaptic.fit import fit
 from cohaptic.law import Held, Law, Peer, State
 from cohaptic.link import CAUSES, Copies, Event, Link, Sent, profile
+from cohaptic.peer import Device, Joined, Reading, join
 from cohaptic.run import Picture, Run
 from cohaptic.scene import Check, Expectation, Scene
 from cohaptic.stability import Admittance, Boundary, ContactMode, Crossing, Map, Part, Radius, Stability
@@ -41,9 +42,11 @@ __all__ = [
     "ContactMode",
     "Copies",
     "Crossing",
+    "Device",
     "Event",
     "Expectation",
     "Held",
+    "Joined",
     "Law",
     "Link",
     "Map",
@@ -51,6 +54,7 @@ __all__ = [
     "Peer",
     "Picture",
     "Radius",
+    "Reading",
     "Run",
     "Scene",
     "SceneError",
@@ -62,5 +66,6 @@ __all__ = [
     "campaign",
     "compare",
     "fit",
+    "join",
     "profile",
 ]

@@ -14,7 +14,10 @@ MODULES = [
     "cohaptic",
     *(
         f"cohaptic.{name}"
-        for name in ("campaign", "compare", "errors", "fit", "gym", "law", "link", "run", "scene", "stability", "table")
+        for name in (
+            *("campaign", "compare", "errors", "fit", "gym", "law", "link", "peer", "peer.device"),
+            *("run", "scene", "stability", "table"),
+        )
     ),
 ]
 
