@@ -15,6 +15,8 @@ const AT_MOST: Duration = Duration::from_secs(120);
 pub(super) enum Language {
     Python,
     Cpp,
+    /// The bridge of `docs/examples/chai3d`, compiled with the stand-in for CHAI3D.
+    Chai3d,
 }
 
 /// Program that can be run: the command and its first arguments.
@@ -31,18 +33,77 @@ impl Program {
     }
 }
 
+/// Options with which each compiled program of these tests must pass.
+const STRICT: &[&str] = &["-O1", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror"];
+
+/// Compiler of these tests.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Compiler {
+    C99,
+    Cpp11,
+    Cpp17,
+    /// MinGW-w64, whose programs are not run.
+    Windows,
+}
+
+impl Compiler {
+    /// Returns the command of the compiler with its strict options and the folder of the examples among the include folders, or `None` on a machine without
+    /// the compiler.
+    fn command(self) -> Option<Command> {
+        let (names, standard) = match self {
+            Self::C99 => (["cc", "gcc", "clang"], "-std=c99"),
+            Self::Cpp11 => (["c++", "g++", "clang++"], "-std=c++11"),
+            Self::Cpp17 => (["c++", "g++", "clang++"], "-std=c++17"),
+            Self::Windows => (["x86_64-w64-mingw32-g++-posix", "x86_64-w64-mingw32-g++", "x86_64-w64-mingw32-c++"], "-std=c++11"),
+        };
+        let mut command = Command::new(names.into_iter().find(|name| is_there(name))?);
+        command.arg(standard).args(STRICT).arg("-I").arg(example(""));
+        Some(command)
+    }
+
+    /// Compiles a program from one source file. Returns the program and its folder. Prints a message and returns `None` on a machine without the compiler.
+    /// `extra`: further options, before the source.
+    pub(super) fn compile(self, source: &Path, extra: &[&str]) -> Option<(TempDir, PathBuf)> {
+        let Some(mut command) = self.command() else {
+            eprintln!("skipped: no compiler of {self:?} was found");
+            return None;
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let program = folder.path().join("program");
+        // A test in C is compiled as C++ too, under a name that says so.
+        let renamed = folder.path().join("program.cpp");
+        let is_c = source.extension().is_some_and(|extension| extension == "c");
+        let source = if is_c && !matches!(self, Self::C99) {
+            std::fs::copy(source, &renamed).unwrap();
+            &renamed
+        } else {
+            source
+        };
+        // Libraries come after the sources that need them.
+        let libraries: &[&str] = if matches!(self, Self::Windows) { &["-lws2_32", "-lbcrypt", "-lwinmm"] } else { &["-pthread", "-lm"] };
+        let output = command.args(extra).arg(source).args(libraries).arg("-o").arg(&program).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        Some((folder, program))
+    }
+
+    /// Returns whether programs with these options can be compiled and run here.
+    pub(super) fn can(self, options: &[&str]) -> bool {
+        let folder = tempfile::tempdir().unwrap();
+        let (source, program) = (folder.path().join("empty.c"), folder.path().join("empty"));
+        std::fs::write(&source, "int main(void) { return 0; }\n").unwrap();
+        let Some(mut command) = self.command() else { return false };
+        let compiled = command.args(options).arg(&source).arg("-o").arg(&program).output().is_ok_and(|output| output.status.success());
+        compiled && Command::new(&program).status().is_ok_and(|status| status.success())
+    }
+}
+
 /// The compiled C++ program, made once for all tests, and its folder. `None` on a machine without a compiler.
-static CPP: LazyLock<Option<(TempDir, PathBuf)>> = LazyLock::new(|| {
-    let compiler = ["c++", "g++", "clang++"].into_iter().find(|name| is_there(name))?;
-    let folder = tempfile::tempdir().unwrap();
-    let program = folder.path().join("udp_peer");
-    let output = Command::new(compiler)
-        .args(["-std=c++17", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror", "-pthread", "-o"])
-        .args([&program, &example("udp_peer.cpp")])
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    Some((folder, program))
+static CPP: LazyLock<Option<(TempDir, PathBuf)>> = LazyLock::new(|| Compiler::Cpp17.compile(&example("udp_peer.cpp"), &[]));
+
+/// The compiled bridge and its folder. `None` on a machine without a compiler.
+static BRIDGE: LazyLock<Option<(TempDir, PathBuf)>> = LazyLock::new(|| {
+    let stub = example("chai3d/stub");
+    Compiler::Cpp11.compile(&example("chai3d/bridge.cpp"), &["-I", stub.to_str().unwrap()])
 });
 
 impl Language {
@@ -51,6 +112,7 @@ impl Language {
         let words = match self {
             Self::Python => is_there("python3").then(|| vec!["python3".into(), example("udp_peer.py")]),
             Self::Cpp => CPP.as_ref().map(|(_, program)| vec![program.clone()]),
+            Self::Chai3d => BRIDGE.as_ref().map(|(_, program)| vec![program.clone()]),
         };
         if words.is_none() {
             eprintln!("skipped: no {} was found", if matches!(self, Self::Python) { "python3" } else { "C++ compiler" });
@@ -59,7 +121,8 @@ impl Language {
     }
 }
 
-fn example(name: &str) -> PathBuf {
+/// Returns the path of a file of `docs/examples`.
+pub(super) fn example(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples").join(name)
 }
 
@@ -117,6 +180,7 @@ pub(super) struct Summary {
     pub(super) position: Vec<f64>,
     pub(super) velocity: Vec<f64>,
     pub(super) device: Vec<f64>,
+    pub(super) device_velocity: Vec<f64>,
     pub(super) orientation: Option<[f64; 4]>,
     pub(super) others: Vec<Other>,
 }
@@ -139,7 +203,8 @@ pub(super) fn summary(running: Running) -> Summary {
     assert!(success && error.is_empty(), "{error}");
     let value: Value = serde_json::from_str(&out).unwrap();
     let count = |key: &str| value[key].as_u64().unwrap();
-    let numbers = |key: &str| value[key].as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect();
+    // The state of a device is missing where the device is not simulated by the program.
+    let numbers = |key: &str| value[key].as_array().into_iter().flatten().map(|number| number.as_f64().unwrap()).collect();
     let others = value["others"].as_array().unwrap().iter();
     Summary {
         ticks: count("ticks"),
@@ -149,6 +214,7 @@ pub(super) fn summary(running: Running) -> Summary {
         position: numbers("position"),
         velocity: numbers("velocity"),
         device: numbers("device"),
+        device_velocity: numbers("device_velocity"),
         orientation: value["orientation"].as_array().map(|q| std::array::from_fn(|place| q[place].as_f64().unwrap())),
         others: others
             .map(|other| Other {

@@ -230,6 +230,21 @@ fn the_cpp_peer_takes_part_with_a_key() {
 }
 
 #[test]
+fn the_bridge_to_chai3d_takes_part_with_a_key() {
+    takes_part(Language::Chai3d, true);
+}
+
+#[test]
+fn the_bridge_to_chai3d_comes_back_when_the_session_is_started_again() {
+    comes_back(Language::Chai3d);
+}
+
+#[test]
+fn the_bridge_to_chai3d_with_another_key_gives_up() {
+    gives_up(Language::Chai3d);
+}
+
+#[test]
 fn the_python_peer_comes_back_when_the_session_is_started_again() {
     comes_back(Language::Python);
 }
