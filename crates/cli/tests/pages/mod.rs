@@ -113,6 +113,7 @@ pages! {
     how_to_second_computer: "docs/how-to-second-computer.md",
     model: "docs/model.md",
     netem: "docs/netem.md",
+    own_device: "docs/own-device.md",
     falcon_crate: "crates/falcon/README.md",
     peer_crate: "crates/peer/README.md",
     prediction: "docs/prediction.md",
