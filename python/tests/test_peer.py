@@ -119,6 +119,29 @@ def test_pd_is_ap_with_the_gains_of_all_others() -> None:
     assert ap.copy.states[0][0] > 1e-3
 
 
+def test_a_peer_begins_anew_after_silence() -> None:
+    """After a second one hello in 250 ms, with one new nonce; then numbers begin anew. Another scene ends the loop."""
+    s, key = 10**9, bytes(range(32))
+    for update in (8_000_000, 16_000_000):
+        session = Session(7, 0)
+        me = Peer(session, Mechanics(), Joining(key, session), 5 * s)
+        me.others[1].newest = 900
+        assert me.begin_anew(6 * s - 1) is None
+        hello = me.begin_anew(6 * s)
+        assert hello is not None
+        assert me.begin_anew(6 * s + 249 * MS) is None
+        assert me.begin_anew(6 * s + 250 * MS) == hello
+        body = peer.datagrams.WELCOME.pack(b"CHPW", 1, 1, 0, 7, 0, 2, hello[24:40], bytes(16), 1_000_000, update)
+        welcome = body + peer.datagrams.tag(key, body)
+        if update == session.update_ns:
+            assert me.take(welcome, 7 * s)
+            assert (me.joinings, me.others[1].newest, me.is_in_silence(7 * s)) == (2, None, False)
+            assert not me.take(welcome, 7 * s)
+        else:
+            with pytest.raises(ConnectionError, match="another scene"):
+                me.take(welcome, 7 * s)
+
+
 def blocks() -> dict[str, bytes]:
     """The blocks of bytes of the worked examples, by title."""
     found: dict[str, bytes] = {}

@@ -288,6 +288,57 @@ static void pushed(void) {
     CHECK(fabs(peer.copy.velocity[0] - 0.5 * 0.1 / 0.225) < 1e-12 && fabs(peer.copy.position[0] - 0.5 * 0.5 * 0.01 / 0.225) < 1e-12);
 }
 
+/* Writes the welcome to the hello `asked` of a session with these facts. */
+static size_t welcome(const uint8_t key[COHAPTIC_KEY], const cohaptic_session *told, const uint8_t *asked, uint8_t *out) {
+    memset(out, 0, COHAPTIC_HANDSHAKE);
+    memcpy(out, "CHPW\1", 5);
+    out[6] = told->axes, out[7] = told->turns;
+    cohaptic_put(out + 8, told->number, 8);
+    cohaptic_put(out + 16, told->place, 4);
+    cohaptic_put(out + 20, told->peers, 4);
+    memcpy(out + 24, asked + 24, COHAPTIC_NONCE);
+    memset(out + 40, 0x77, COHAPTIC_NONCE);
+    cohaptic_put(out + 56, told->tick_ns, 8);
+    cohaptic_put(out + 64, told->update_ns, 8);
+    return cohaptic_add_tag(key, out, COHAPTIC_HANDSHAKE - COHAPTIC_TAG);
+}
+
+/* After a second of silence the peer says hello every 250 ms with one new nonce, and believes the welcome. Numbers then begin anew. */
+static void silence(void) {
+    static const int64_t S = 1000 * MS;
+    uint8_t first[COHAPTIC_NONCE], second[COHAPTIC_NONCE], out[COHAPTIC_DATAGRAM], hello[COHAPTIC_DATAGRAM], in[COHAPTIC_DATAGRAM];
+    static cohaptic_peer peer;
+    cohaptic_session session = cohaptic_usual().session;
+    cohaptic_scene scene = cohaptic_usual().scene;
+    int changed;
+    memset(first, 1, sizeof first);
+    memset(second, 2, sizeof second);
+    for (changed = 0; changed < 2; ++changed) {
+        cohaptic_session told = session;
+        CHECK(cohaptic_peer_begin(&peer, &session, &scene, 5 * S) == NULL);
+        memset(peer.key, 9, sizeof peer.key);
+        peer.keyed = 1, peer.joinings = 1;
+        peer.others[1].has_newest = 1, peer.others[1].newest = 900;
+        CHECK(cohaptic_peer_begin_anew(&peer, 6 * S - 1, first, out) == 0 && !cohaptic_peer_is_in_silence(&peer, 6 * S - 1));
+        CHECK(cohaptic_peer_begin_anew(&peer, 6 * S, first, hello) == COHAPTIC_HANDSHAKE && cohaptic_peer_is_in_silence(&peer, 6 * S));
+        CHECK(memcmp(hello + 24, first, COHAPTIC_NONCE) == 0);
+        CHECK(cohaptic_peer_begin_anew(&peer, 6 * S + 249 * MS, second, out) == 0);
+        CHECK(cohaptic_peer_begin_anew(&peer, 6 * S + 250 * MS, second, out) == COHAPTIC_HANDSHAKE && memcmp(out, hello, COHAPTIC_HANDSHAKE) == 0);
+        if (changed) told.update_ns *= 2;
+        CHECK(cohaptic_peer_take(&peer, in, welcome(peer.key, &told, hello, in), 7 * S));
+        CHECK(peer.joinings == 2 && !peer.others[1].has_newest && !cohaptic_peer_is_in_silence(&peer, 7 * S) && peer.other_session == changed);
+        /* The same welcome again is nothing new. */
+        CHECK(!cohaptic_peer_take(&peer, in, COHAPTIC_HANDSHAKE, 7 * S) && peer.ignored == 1);
+    }
+    /* Without a key only the numbers are forgotten. */
+    CHECK(cohaptic_peer_begin(&peer, &session, &scene, 0) == NULL);
+    peer.others[1].has_newest = 1;
+    CHECK(cohaptic_peer_begin_anew(&peer, S, first, out) == 0 && !peer.others[1].has_newest);
+    /* A scene of one peer has nobody to hear. */
+    session.peers = 1;
+    CHECK(cohaptic_peer_begin(&peer, &session, &scene, 0) == NULL && !cohaptic_peer_is_in_silence(&peer, 9 * S));
+}
+
 static void refused(void) {
     static cohaptic_peer peer;
     cohaptic_session session = cohaptic_usual().session;
@@ -394,6 +445,7 @@ int main(int argc, char **argv) {
     figures();
     laws();
     pushed();
+    silence();
     refused();
     loop();
     refusals_of_open();
