@@ -79,6 +79,15 @@ fn a_feature_that_is_off_compiles_nothing() {
     assert!(added("tokio-net").contains(&"mio".to_owned()));
 }
 
+/// Somebody who tests networks waits for no driver of a device.
+#[test]
+fn the_program_without_drivers_compiles_none() {
+    let (all, without) = (compiled("cohaptic-cli", &[]), compiled("cohaptic-cli", &["--no-default-features"]));
+    let left_out: Vec<&String> = all.difference(&without).collect();
+    assert!(["cohaptic-falcon", "nusb"].iter().all(|driver| left_out.iter().any(|name| name == driver)), "{left_out:?}");
+    assert!(without.contains("cohaptic-live") && without.is_subset(&all));
+}
+
 /// Optimisation at link time has the level of the crate that is linked. With that of the command line in `release` the program of wheels took 1.8 times as long.
 #[test]
 fn programs_that_are_given_away_are_linked_with_full_optimisation() {

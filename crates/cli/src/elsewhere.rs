@@ -1,8 +1,11 @@
-//! Stand-ins, on other systems, for the commands of Linux: each stand-in takes the arguments of the command, prints an error, and ends with status 3.
+//! Stand-ins for the commands that this program was built without, because of the system or of a feature of cargo: each stand-in takes the arguments of the
+//! command, prints an error, and ends with status 3.
 
-/// Makes a module per command. The function of the module fails with a message that the command needs Linux.
-macro_rules! need_linux {
-    ($($command:ident: $arguments:ident),* $(,)?) => {
+use crate::failure::Failure;
+
+/// Makes a module per command. The function of the module fails with the message of `$without`, a function of the name of the command.
+macro_rules! stand_in {
+    ($without:ident; $($command:ident: $arguments:ident),* $(,)?) => {
         $(
             pub(crate) mod $command {
                 use std::process::ExitCode;
@@ -11,18 +14,36 @@ macro_rules! need_linux {
                 use crate::failure::Failure;
 
                 pub(crate) fn $command(_: &$arguments) -> Result<ExitCode, Failure> {
-                    let command = stringify!($command);
-                    Err(Failure::System(format!("cohaptic {command} needs Linux: its clocks, sockets or devices are those of Linux")))
+                    Err(super::$without(stringify!($command)))
                 }
             }
         )*
     };
 }
 
-need_linux! {
+#[cfg(not(target_os = "linux"))]
+fn without_linux(command: &str) -> Failure {
+    Failure::System(format!("cohaptic {command} needs Linux: its clocks, sockets or devices are those of Linux"))
+}
+
+#[cfg(not(target_os = "linux"))]
+stand_in! {
+    without_linux;
     falcon: FalconArguments,
     live: LiveArguments,
     play: PlayArguments,
     relay: RelayArguments,
     router: RouterArguments,
+}
+
+/// The command of a device has the name of the feature that drives the device.
+#[cfg(target_os = "linux")]
+fn without_driver(command: &str) -> Failure {
+    Failure::System(format!("cohaptic {command}: {}", crate::failure::without_feature(command)))
+}
+
+#[cfg(all(target_os = "linux", not(feature = "falcon")))]
+stand_in! {
+    without_driver;
+    falcon: FalconArguments,
 }

@@ -130,9 +130,14 @@ pub(crate) fn of_variant(error: SceneError, option: &'static str, overrides: &[S
 /// simulated.
 pub(crate) fn too_large(scene: &Scene, overrides: &[String], model: Model, watched: bool) -> Option<SceneError> {
     let TooLarge { peer, reason } = cohaptic_harness::too_large(scene, model, watched)?;
+    at_peer_of(scene, overrides, peer, &reason)
+}
+
+/// Returns an error at the place of a peer in the file of a readable scene.
+pub(crate) fn at_peer_of(scene: &Scene, overrides: &[String], peer: usize, reason: &str) -> Option<SceneError> {
     // A scene from standard input has a name for messages as its file. The path `-` gives the kept bytes of standard input.
     let path = if scene.file == input::named(Path::new("-")) { Path::new("-") } else { &scene.file };
-    let refused = |text: &str, file: &Path| Err::<(), SceneError>(at_peer(text, file, overrides, peer, &reason));
+    let refused = |text: &str, file: &Path| Err::<(), SceneError>(at_peer(text, file, overrides, peer, reason));
     input::with(path, refused).err()
 }
 
@@ -156,4 +161,10 @@ impl From<RecordError> for Failure {
     fn from(error: RecordError) -> Self {
         Self::Record(error)
     }
+}
+
+/// Returns the end of an error: this program was built without a feature.
+#[cfg(target_os = "linux")]
+pub(crate) fn without_feature(feature: &str) -> String {
+    format!("this program was built without the feature {feature}. Expected a program from: cargo build -p cohaptic-cli --features {feature}")
 }

@@ -5,6 +5,7 @@
 //! Exit status: 0 done, 1 an expectation failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted, 141 standard output was closed.
 #![expect(non_camel_case_types, reason = "`document!` makes a type parameter of each key")]
 #![cfg_attr(not(target_os = "linux"), allow(dead_code, unused_imports, reason = "the commands that need Linux use them"))]
+#![cfg_attr(not(feature = "falcon"), allow(dead_code, unused_imports, reason = "the command of the device uses them"))]
 
 mod admittance;
 mod analysis_watch;
@@ -14,13 +15,13 @@ mod check;
 mod compare;
 mod completions;
 mod document_schema;
-#[cfg(not(target_os = "linux"))]
+#[cfg(not(all(target_os = "linux", feature = "falcon")))]
 mod elsewhere;
 mod expectations;
 mod explain;
 mod facade;
 mod failure;
-#[cfg(target_os = "linux")]
+#[cfg(all(target_os = "linux", feature = "falcon"))]
 mod falcon;
 mod file;
 mod fit;
@@ -53,8 +54,10 @@ mod variants;
 use std::process::ExitCode;
 
 use arguments::{Arguments, Command};
+#[cfg(not(all(target_os = "linux", feature = "falcon")))]
+use elsewhere::falcon;
 #[cfg(not(target_os = "linux"))]
-use elsewhere::{falcon, live, play, relay, router};
+use elsewhere::{live, play, relay, router};
 
 fn main() -> ExitCode {
     // `--json` is looked for before the arguments are parsed, because a refused argument is answered with a document too. Words after `--` are no options.

@@ -41,6 +41,7 @@
 mod admission;
 pub mod client;
 mod entropy;
+#[cfg(feature = "falcon")]
 pub mod falcons;
 pub mod handshake;
 mod key;

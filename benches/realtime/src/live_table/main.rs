@@ -3,6 +3,7 @@
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 
 mod admission;
+mod devices;
 mod session;
 
 use std::error::Error;
@@ -56,6 +57,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("    cargo run --profile dist -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md\n");
     println!("and measured on: {}. Each row is a run of {seconds} s, all of them one after the other in one process.\n", machine::name());
     loops(span)?;
+    calls_of_devices(span)?;
     at_the_door()
 }
 
@@ -99,6 +101,24 @@ fn loops(span: Duration) -> Result<(), Box<dyn Error>> {
     refused.dedup();
     if !refused.is_empty() {
         println!("\nThe system refused, so that rows with `SCHED_FIFO` are rows without: {}.", refused.join("; "));
+    }
+    println!();
+    Ok(())
+}
+
+fn calls_of_devices(span: Duration) -> Result<(), Box<dyn Error>> {
+    println!("## Devices\n");
+    println!(
+        "A session with three simulated Falcons, each with a thread of its own. *Calls* is the time that the loop spends in `read` and `hold` of one device at"
+    );
+    println!("one tick. [The contract](extending.md#a-device-of-your-own-in-rust) allows 50 µs at p99.\n");
+    println!(
+        "| `SCHED_FIFO` | ticks | calls: p50 \\[µs\\] | p99 \\[µs\\] | p99.9 \\[µs\\] | max \\[µs\\] |\n| --- | ---: | ---: | ---: | ---: | ---: |"
+    );
+    for wishes in [Wishes::NONE, with_priority()] {
+        let took = devices::run(wishes, span)?;
+        let [p50, p99, p999, max] = quantiles(took);
+        println!("| {} | {} | {p50} | {p99} | {p999} | {max} |", if wishes.priority.is_some() { "asked for" } else { "" }, took.count);
     }
     println!();
     Ok(())

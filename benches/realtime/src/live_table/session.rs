@@ -58,7 +58,7 @@ pub(crate) fn run(peers: usize, members: Members, pacing: Pacing, wishes: Wishes
 }
 
 /// Nobody looks on, as in `cohaptic live` without live control.
-struct Nobody;
+pub(crate) struct Nobody;
 
 impl Conductor for Nobody {
     fn keep_going(&mut self) -> bool {

@@ -12,10 +12,11 @@ use cohaptic_falcon::transport::{Request, Transport, TransportError};
 use cohaptic_falcon::usb::{self, Listed, UsbError, UsbTransport};
 use cohaptic_units::Instant;
 
+use super::loading;
 use crate::arguments::WhichFalcon;
 use crate::failure::Failure;
 use crate::progress::Progress as Bar;
-use crate::realtime::{loading, say};
+use crate::realtime::say;
 
 /// Amplitudes \[m\] and frequency \[Hz\] of the swaying simulated hand.
 pub(super) const SWAY: ([f64; 3], f64) = ([0.020, 0.015, 0.010], 0.5);

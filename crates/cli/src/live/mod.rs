@@ -1,6 +1,7 @@
 //! `cohaptic live`: runs a scene by the wall clock, with peers attached by network or as Falcons.
 
 mod answer;
+mod devices;
 pub(crate) mod onlookers;
 mod page;
 
@@ -10,13 +11,10 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::mpsc::channel;
 use std::thread;
-use std::time::{Duration, Instant as Clock};
+use std::time::Duration;
 
-use cohaptic_falcon::boot;
 use cohaptic_harness::Model;
-use cohaptic_live::falcons::{Falcons, SIMULATED_HOMING};
 use cohaptic_live::{Report, Session, SessionConfig, SessionError, SessionKey, SystemEntropy};
-use cohaptic_realtime::Wishes;
 use cohaptic_scene::{KeysOfLinks, PeerKind, Scene, SceneContent, link_key_changes_of_text, link_keys_of_text, scene_content_of_text};
 use cohaptic_units::Instant;
 use cohaptic_units::print::{Counted, Span};
@@ -26,7 +24,7 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::{self, Failure, INTERRUPTED};
 use crate::file::{own_folder, write_file};
 use crate::progress::Progress;
-use crate::realtime::{ControlFiles, KeyedLinks, LiveControl, loading, own_address, say};
+use crate::realtime::{ControlFiles, KeyedLinks, LiveControl, own_address, say};
 use crate::run::page::edits;
 use crate::{input, interrupt, output};
 use onlookers::SessionConductor;
@@ -67,6 +65,9 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
         return Err(Failure::Input(format!("{}: topology: {message}", input::named(path).display())));
     }
     if let Some(error) = failure::too_large(&scene, overrides, Model::Least, true) {
+        return Err(error.into());
+    }
+    if let Some(error) = devices::undriven(&scene, overrides) {
         return Err(error.into());
     }
     let pairs = onlookers::pairs(&scene);
@@ -130,8 +131,8 @@ fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent) -> Resu
         ..SessionConfig::new(arguments.listen)
     };
     // Simulated devices take time to home. The sockets are opened afterwards, so that peers find a session that is about to begin.
-    let Some(mut falcons) = ready_falcons(scene, arguments.firmware.as_deref(), real_time.wishes())? else { return Ok(None) };
-    Session::open(scene, config, |peer| falcons.take(peer)).map(Some).map_err(refused)
+    let Some(mut devices) = devices::ready(scene, arguments.firmware.as_deref(), real_time.wishes())? else { return Ok(None) };
+    Session::open(scene, config, |peer| devices[peer].take()).map(Some).map_err(refused)
 }
 
 fn conduct(scene: &Scene, session: Session, mut host: SessionConductor, control: &LiveControl) -> Result<Report, Failure> {
@@ -161,44 +162,6 @@ pub(crate) fn refused(error: SessionError) -> Failure {
     }
     let is_of_system = matches!(error, SessionError::Bind(_) | SessionError::System(_));
     if is_of_system { Failure::System(error.to_string()) } else { Failure::Input(error.to_string()) }
-}
-
-/// Opens the Falcons of the scene and waits until all simulated Falcons are homed by simulated hands. Returns `None` if the user asked for the end while
-/// waiting. Real Falcons are homed by their users during the session.
-fn ready_falcons(scene: &Scene, firmware: Option<&Path>, wishes: Wishes) -> Result<Option<Falcons>, Failure> {
-    let told = |peer: &str, progress: boot::Progress| {
-        if let Some(said) = loading(progress) {
-            say(&format!("the Falcon of {peer}: {said}"));
-        }
-    };
-    let falcons = Falcons::open(scene, firmware, wishes, told).map_err(|fault| Failure::System(fault.to_string()))?;
-    // A second signal ends the program without running destructors, so the motors are stopped by actions before the exit.
-    for stopper in falcons.stoppers() {
-        interrupt::before_exit(move || stopper.stop());
-    }
-    let names = |simulated: bool| -> Vec<&str> {
-        falcons.readiness().filter(|(_, at)| at.is_simulated == simulated).map(|(peer, _)| scene.peers[peer].name.as_str()).collect()
-    };
-    let simulated = names(true);
-    if !simulated.is_empty() {
-        say(&format!("homing the simulated Falcons of {}", simulated.join(", ")));
-        let start = Clock::now();
-        while !falcons.simulated_are_ready() {
-            if interrupt::requested() {
-                return Ok(None);
-            }
-            if start.elapsed() > SIMULATED_HOMING {
-                return Err(Failure::System(
-                    "a simulated Falcon could not be homed: this machine is too slow to simulate it in real time".to_owned(),
-                ));
-            }
-            thread::sleep(Duration::from_millis(20));
-        }
-    }
-    for peer in names(false) {
-        say(&format!("the Falcon of {peer}: pull the grip fully out, push it fully in, pull it out again; {peer} joins when its light is green"));
-    }
-    Ok(Some(falcons))
 }
 
 /// Prints the address for the datagrams of remote peers, if the scene has remote peers.

@@ -14,7 +14,7 @@ use crate::arguments::RealTimeArguments;
 pub(crate) use addresses::{own_address, reached_from_elsewhere};
 pub(crate) use control::{Edit, KeyedLinks, LiveControl, Look, counters, quantiles, quantiles_of, refused_server, token_of};
 pub(crate) use control_files::ControlFiles;
-pub(crate) use words::{ConfiguredDelay, Publisher, carried, counts, late, loading, notes, say, some_length, status};
+pub(crate) use words::{ConfiguredDelay, Publisher, carried, counts, late, notes, say, some_length, status};
 
 impl RealTimeArguments {
     /// Returns how the thread waits for its next deadline: by spinning with `--spin`, otherwise by sleeping.

@@ -5,7 +5,6 @@ use std::io::{self, Write as _};
 use std::time::{Duration, Instant as Clock};
 
 use cohaptic_control::Snapshot;
-use cohaptic_falcon::boot::Progress;
 use cohaptic_realtime::{LatenessSummary, Prepared, Validity, Wish};
 use cohaptic_units::print::Counted;
 use cohaptic_units::visible_lines;
@@ -49,18 +48,6 @@ pub(crate) fn notes(prepared: &Prepared, validity: Validity) -> String {
         );
     }
     text
-}
-
-/// Describes the progress of loading the firmware of a Falcon. Returns `None` for events too frequent for a line.
-pub(crate) fn loading(progress: Progress) -> Option<String> {
-    match progress {
-        Progress::Attempt(attempt) => Some(format!("loading the firmware, attempt {attempt}")),
-        Progress::Greeted(_) => Some("the boot loader answers".to_owned()),
-        // Each block of bytes is an event, and only the last block gets a line.
-        Progress::Loaded { done, of } => (done == of).then(|| format!("all {of} bytes are sent")),
-        Progress::Failed(error) => Some(error.to_string()),
-        Progress::Running => Some("its firmware runs".to_owned()),
-    }
 }
 
 /// Prints a line on standard error, with control characters escaped.

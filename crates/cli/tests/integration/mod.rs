@@ -17,10 +17,13 @@ mod compare;
 mod completions;
 mod desk;
 mod documents;
+#[cfg(all(target_os = "linux", not(feature = "falcon")))]
+mod driverless;
 mod errors;
 #[cfg(unix)]
 mod existing;
 mod explain;
+#[cfg(feature = "falcon")]
 mod falcon;
 mod fit;
 mod fit_captures;
@@ -32,7 +35,7 @@ mod interrupt;
 mod link;
 #[cfg(unix)]
 mod live;
-#[cfg(unix)]
+#[cfg(all(unix, feature = "falcon"))]
 mod live_falcons;
 mod measured;
 mod messages;

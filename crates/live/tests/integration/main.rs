@@ -4,8 +4,10 @@
 
 mod client;
 mod conversation;
+#[cfg(feature = "falcon")]
 mod ends;
 mod examples;
+#[cfg(feature = "falcon")]
 mod falcons;
 mod floods;
 mod hostile;
