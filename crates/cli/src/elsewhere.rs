@@ -30,6 +30,7 @@ fn without_linux(command: &str) -> Failure {
 stand_in! {
     without_linux;
     falcon: FalconArguments,
+    join: JoinArguments,
     live: LiveArguments,
     play: PlayArguments,
     relay: RelayArguments,

@@ -28,6 +28,8 @@ mod fit;
 mod init;
 mod input;
 mod interrupt;
+#[cfg(target_os = "linux")]
+mod join;
 mod link;
 #[cfg(target_os = "linux")]
 mod live;
@@ -57,7 +59,7 @@ use arguments::{Arguments, Command};
 #[cfg(not(all(target_os = "linux", feature = "falcon")))]
 use elsewhere::falcon;
 #[cfg(not(target_os = "linux"))]
-use elsewhere::{live, play, relay, router};
+use elsewhere::{join, live, play, relay, router};
 
 fn main() -> ExitCode {
     // `--json` is looked for before the arguments are parsed, because a refused argument is answered with a document too. Words after `--` are no options.
@@ -82,6 +84,7 @@ fn main() -> ExitCode {
         Command::Stability(arguments) => stability::stability(&arguments),
         Command::Admittance(arguments) => admittance::admittance(&arguments),
         Command::Live(arguments) => live::live(&arguments),
+        Command::Join(arguments) => join::join(&arguments),
         Command::Play(arguments) => play::play(&arguments),
         Command::Study(arguments) => study::study(&arguments),
         Command::Relay(arguments) => relay::relay(&arguments),

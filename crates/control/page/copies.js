@@ -35,6 +35,7 @@ function takePeers(peers, body) {
     index,
   }));
   showPeers(peers);
+  showJoined(peers);
 }
 
 /** Whether these are that many numbers. */
@@ -85,6 +86,21 @@ function showPeers(peers) {
     put(turn, isAll(peer.orientation, 4) ? turnOf(peer.orientation).map((angle) => signed(angle.toFixed(1))).join(', ') + '°' : '–');
     put(force, peer.force.length ? peer.force.map((f) => (f === null ? '–' : signed(f.toFixed(2)))).join(', ') + ' N' : '–');
   });
+}
+
+/** Says of each program that joined: which device, from where, how long ago its last sample came, and how many samples never came. */
+function showJoined(peers) {
+  const lines = peers
+    .filter((peer) => peer.joined)
+    .map((peer) => {
+      const { device, address, lost, sent } = peer.joined;
+      const age = peer.age_s === null ? 'no sample yet' : 'last sample ' + span(peer.age_s, 2) + ' ago';
+      return `${peer.name}: ${device} at ${address}, ${PRESENCE[peer.status]}, ${age}, ${lost} of ${sent} lost`;
+    });
+  const list = $('joined');
+  list.hidden = lines.length === 0;
+  while (list.children.length > lines.length) list.lastChild.remove();
+  lines.forEach((line, i) => put(list.children[i] || list.appendChild(make('li')), line));
 }
 
 /** Draws the copies; called for each frame of the screen while there are any. */

@@ -55,6 +55,6 @@ mod views;
 pub use board::{Board, Latest, LinkEditor};
 pub use server::{ServeError, Server, ServerConfig, serve, serve_stage, serve_study};
 pub use snapshot::{Body, Description, Kind, LinkName, MeasureLabel, PeerName};
-pub use snapshot::{LinkCounters, PeerView, Presence, Quantiles, Snapshot, TurnView};
+pub use snapshot::{JoinedView, LinkCounters, PeerView, Presence, Quantiles, Snapshot, TurnView};
 pub use stage::{Hands, Role, Stage, StageFile, Study};
 pub use token::{Guests, Token, TokenError};

@@ -88,6 +88,21 @@ pub struct PeerView {
     pub force: Vec<f64>,
     /// Orientations; `None` if the object does not rotate.
     pub turn: Option<TurnView>,
+    /// Program of the participant; `None` if no other program runs the participant.
+    pub joined: Option<JoinedView>,
+}
+
+/// Program that runs a participant, and its way to this program.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct JoinedView {
+    /// Name of the device, as the program told, or the kind of the participant.
+    pub device: String,
+    /// Address of the computer.
+    pub address: String,
+    /// Samples that never came.
+    pub lost: u64,
+    /// Samples that the program has sent.
+    pub sent: u64,
 }
 
 /// Orientation of a participant's copy, and pose of the participant's device, for a picture in depth. Orientations are unit quaternions (w, x, y, z) from

@@ -99,6 +99,10 @@ fn peers(description: &Description, snapshot: &Snapshot) -> Vec<Value> {
             "position": view.position,
             "force": view.force,
         });
+        // An entry only for participants that another program runs.
+        if let Some(joined) = &view.joined {
+            shown["joined"] = json!({ "device": joined.device, "address": joined.address, "lost": joined.lost, "sent": joined.sent });
+        }
         // Without a body nothing rotates, and the entries would be `null` in every state.
         if let Some(body) = &description.body {
             shown["grasp"] = json!(body.grasps.get(number));

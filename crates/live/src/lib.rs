@@ -4,7 +4,7 @@
 //!
 //! [`Session`] is such a session, with its sockets and its clock. [`AdmissionControl`] decides which datagrams from outside reach the scene, and makes the
 //! datagrams to programs outside. It does no input or output and reads no clock. [`client`] is the side of a peer, for programs in Rust, and [`handshake`] has
-//! the datagrams that both sides exchange before the samples. The protocol is written byte by byte in `docs/live-protocol.md`.
+//! the datagrams that both sides exchange before the samples. [`join`] is a whole peer at another computer than the session. The protocol is written byte by byte in `docs/live-protocol.md`.
 //!
 //! The crate does not encrypt: with a [`SessionKey`] strangers cannot send samples, but can still read samples. Read [`AdmissionControl`] first.
 //!
@@ -44,19 +44,23 @@ mod entropy;
 #[cfg(feature = "falcon")]
 pub mod falcons;
 pub mod handshake;
+pub mod join;
 mod key;
+mod label;
 mod place;
 pub mod pointers;
 mod seal;
 mod session;
 
 pub use admission::{
-    Admission, AdmissionConfig, AdmissionConfigError, AdmissionControl, AdmissionStats, Admitted, Limits, Refusal, Seat, SeatStatus,
+    Admission, AdmissionConfig, AdmissionConfigError, AdmissionControl, AdmissionStats, Admitted, Limits, OtherScene, Refusal, Seat, SeatStatus,
 };
 pub use entropy::{Entropy, EntropyError, SystemEntropy};
 pub use key::{KeyFileError, SessionKey};
+pub use label::Label;
 pub use place::Place;
 pub use seal::{MAX_DATAGRAM, Nonce};
 pub use session::{
-    Conductor, EndedPacket, LinkChange, LinkStatus, Motion, PeerStatus, Recorded, Report, Session, SessionConfig, SessionError, SocketCounts, Status,
+    Conductor, Connection, EndedPacket, LinkChange, LinkStatus, Motion, PeerStatus, Recorded, Report, Session, SessionConfig, SessionError,
+    SocketCounts, Status,
 };

@@ -103,6 +103,11 @@ pub(super) const LIVE: &[&str] = &[
     "cohaptic live --new-key session.key",
 ];
 
+pub(super) const JOIN: &[&str] = &[
+    "cohaptic join 192.0.2.7:7400 lab.toml --peer left --device falcon --key-file session.key",
+    "cohaptic join 127.0.0.1:7400 lab.toml --peer left --device simulated --for 30s --out left",
+];
+
 pub(super) const PLAY: &[&str] =
     &["cohaptic play", "cohaptic play scene.toml --set link.delay=60ms --out played", "cohaptic play --control 0.0.0.0:8080 --allow-remote"];
 

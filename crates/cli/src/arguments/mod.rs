@@ -4,6 +4,7 @@ mod compare;
 mod examples;
 mod existing;
 mod falcon;
+mod join;
 mod links;
 mod numbers;
 mod pages;
@@ -27,10 +28,11 @@ pub(crate) use existing::{TestArguments, TokioArguments};
 pub(crate) use falcon::{
     FalconArguments, FalconCommand, Force, HandName, HomeArguments, ProbeArguments, SimulateArguments, WatchArguments, WhichFalcon,
 };
+pub(crate) use join::{JoinArguments, JoinDevice};
 pub(crate) use links::{FitArguments, LinkArguments, Profile};
 pub(crate) use pages::{CompletionsArguments, FileKind, InitArguments, ManArguments, SchemaArguments};
 pub(crate) use paper::PaperArguments;
-pub(crate) use realtime::{LiveArguments, PlayArguments, RealTimeArguments, RelayArguments, RouterArguments};
+pub(crate) use realtime::{LiveArguments, PaceArguments, PlayArguments, RealTimeArguments, RelayArguments, RouterArguments};
 pub(crate) use scenes::{CampaignArguments, CheckArguments, ExplainArguments, MeasureArguments, RunArguments, TableFormat};
 pub(crate) use shards::{ShardArguments, ShardName};
 pub(crate) use stability::{
@@ -69,6 +71,8 @@ pub(crate) enum Command {
     Admittance(AdmittanceArguments),
     /// Runs a scene by the wall clock, with other programs and Falcons attached, all through the emulated links
     Live(LiveArguments),
+    /// Joins a live session at another computer: one peer of its scene, with a device here
+    Join(JoinArguments),
     /// Opens a page on which people pull the object by mouse, finger or stick, and see what the network does to it
     Play(PlayArguments),
     /// Runs a study with people in groups, or with modelled persons: balanced orders, questions, tables, a report, and the power of the design

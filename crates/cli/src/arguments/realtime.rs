@@ -1,4 +1,4 @@
-//! `live`, `play`, `relay` and `router`, and what they share.
+//! `live`, `play`, `relay` and `router`, and what they and `join` share.
 
 use std::ffi::OsString;
 use std::net::{SocketAddr, ToSocketAddrs as _};
@@ -13,9 +13,9 @@ use super::Overrides;
 use super::examples::{self, after};
 use super::numbers::integer;
 
-/// Options for punctuality, and live control.
+/// Options for punctuality.
 #[derive(Debug, Args)]
-pub(crate) struct RealTimeArguments {
+pub(crate) struct PaceArguments {
     /// Wake up to 120 µs before each deadline and spin: more punctual, and keeps a core busy
     #[arg(long)]
     pub(crate) spin: bool,
@@ -25,6 +25,13 @@ pub(crate) struct RealTimeArguments {
     /// Accept this lateness: a run is not valid if more than one in a thousand ticks or packets was later [default: that of the file, or 1ms]
     #[arg(long, value_name = "TIME", value_parser = parse::duration)]
     pub(crate) tolerance: Option<Duration>,
+}
+
+/// Options for punctuality, and live control.
+#[derive(Debug, Args)]
+pub(crate) struct RealTimeArguments {
+    #[command(flatten)]
+    pub(crate) pace: PaceArguments,
     /// Serve live control and /metrics over HTTP at this address [without one: a free port of 127.0.0.1]. The URL with its token is printed
     #[arg(long, value_name = "ADDRESS", value_parser = looked_up, num_args = 0..=1, default_missing_value = "127.0.0.1:0")]
     pub(crate) control: Option<SocketAddr>,
@@ -162,7 +169,7 @@ pub(crate) struct RouterArguments {
 
 /// Reads an address with a port, and looks up a name. Takes the first IPv4 address of a name, or the first address if the name has no IPv4 address. Two names
 /// with addresses of both versions then give the two ends of a relay the same version.
-fn looked_up(text: &str) -> Result<SocketAddr, String> {
+pub(super) fn looked_up(text: &str) -> Result<SocketAddr, String> {
     const EXPECTED: &str = "expected an address with a port, such as 127.0.0.1:7000, [::1]:7000 or localhost:7000";
     match address(text) {
         Ok(address) => Ok(address),

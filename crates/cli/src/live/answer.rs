@@ -6,7 +6,7 @@ use cohaptic_answers::{access_line, link_quantiles, link_totals, measured_lines,
 use cohaptic_harness::Ending;
 use cohaptic_harness::live::{GateStats, SeatStats};
 use cohaptic_harness::task::task_words;
-use cohaptic_live::{AdmissionStats, Report, SocketCounts};
+use cohaptic_live::{AdmissionStats, Connection, OtherScene, Report, SocketCounts};
 use cohaptic_realtime::Wish;
 use cohaptic_scene::Scene;
 use cohaptic_units::print::{Counted, Span};
@@ -113,17 +113,13 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
     }
     line(format!("at the end logical time was {:.1} µs behind the clock", micros(report.behind)));
     line(format!("largest discrepancy between two copies: {}", length(summary.max_discrepancy)));
-    for ((peer, spec), seat) in summary.peers.iter().zip(&scene.peers).zip(&report.seats) {
+    for (((peer, spec), seat), connection) in summary.peers.iter().zip(&scene.peers).zip(&report.seats).zip(&report.connections) {
         let position: Vec<String> = peer.position.iter().map(|x| length(*x)).collect();
         let seat = seat.as_ref().map(came).unwrap_or_default();
-        line(format!("{} ({}) ends at {}{seat}", peer.name, spec.kind.name(), position.join(", ")));
+        let way = connection.as_ref().map(way).unwrap_or_default();
+        line(format!("{} ({}) ends at {}{seat}{way}", peer.name, spec.kind.name(), position.join(", ")));
     }
-    for (gate, spec) in report.gates.iter().zip(&scene.peers) {
-        let causes: Vec<String> = gate.iter().flat_map(GateStats::causes).map(|(cause, count)| format!("{}: {count}", cause.name())).collect();
-        if !causes.is_empty() {
-            line(format!("ticks without force on the hand of {}: {}", spec.name, causes.join(", ")));
-        }
-    }
+    report.gates.iter().zip(&scene.peers).filter_map(|(gate, spec)| without_force(&spec.name, gate.as_ref()?)).for_each(&mut line);
     line(packets(summary));
     report.task.iter().for_each(|task| line(format!("task: {}", task_words(task, scene))));
     measured_lines(scene, &report.measures).into_iter().for_each(&mut line);
@@ -133,6 +129,9 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
         if !refused.is_empty() {
             line(format!("refused: {}", refused.join(", ")));
         }
+        if let Some(other) = &report.other_scene {
+            line(other_scene(scene, other));
+        }
         // The sum is a lower bound on systems that do not tell the drops of the kernel.
         let lost = socket.counts.failures.in_all() + socket.counts.oversized + socket.kernel_drops.unwrap_or(0);
         if lost > 0 {
@@ -141,6 +140,29 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
     }
     text.push_str(&notes(&report.prepared, report.validity));
     text
+}
+
+/// Returns the sentence about the ticks at which the gate of a device gave no force, by cause; `None` without such ticks.
+pub(crate) fn without_force(name: &str, gate: &GateStats) -> Option<String> {
+    let causes: Vec<String> = gate.causes().map(|(cause, count)| format!("{}: {count}", cause.name())).collect();
+    (!causes.is_empty()).then(|| format!("ticks without force on the hand of {name}: {}", causes.join(", ")))
+}
+
+/// Returns the device of a program, if the program told it, and the samples that never came, if there are any.
+fn way(connection: &Connection) -> String {
+    let Connection { address, label, lost, sent } = connection;
+    let device = label.text().map(|label| format!(", of {label} at {}", address.ip().to_canonical())).unwrap_or_default();
+    let lost = if *lost > 0 { format!(", {lost} of {sent} lost on the way here") } else { String::new() };
+    device + &lost
+}
+
+/// Returns the sentence about a peer that asked with another scene.
+pub(super) fn other_scene(scene: &Scene, other: &OtherScene) -> String {
+    let OtherScene { place, from, theirs, ours } = other;
+    let name = &scene.peers[place.0 as usize].name;
+    format!(
+        "{from} asked to be {name} with another scene: {theirs:016x}, and this session's is {ours:016x}. Give both the same file and the same --set"
+    )
 }
 
 fn came(seat: &SeatStats) -> String {

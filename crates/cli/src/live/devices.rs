@@ -12,7 +12,7 @@ use crate::failure::{self, Failure};
 const DRIVERS: [(&str, &str, bool); 1] = [("falcon", "falcon", cfg!(feature = "falcon"))];
 
 /// Returns the error for the first peer of a scene with a device that this program cannot drive; `None` if there is no such peer.
-pub(super) fn undriven(scene: &Scene, overrides: &[String]) -> Option<SceneError> {
+pub(crate) fn undriven(scene: &Scene, overrides: &[String]) -> Option<SceneError> {
     scene.peers.iter().enumerate().find_map(|(place, peer)| {
         let kind = peer.kind.name();
         let (_, feature, _) = DRIVERS.iter().find(|(driven, _, is_here)| *driven == kind && !is_here)?;
@@ -21,11 +21,11 @@ pub(super) fn undriven(scene: &Scene, overrides: &[String]) -> Option<SceneError
 }
 
 /// Opened devices, indexed by peer. `None` for a peer without a device.
-pub(super) type Devices = Vec<Option<Box<dyn Device>>>;
+pub(crate) type Devices = Vec<Option<Box<dyn Device>>>;
 
 /// Opens the devices of the scene, and waits until all simulated devices are ready. Returns `None` if the user asked for the end while waiting.
 #[cfg_attr(not(feature = "falcon"), allow(unused_mut, unused_variables, reason = "without drivers nothing is opened"))]
-pub(super) fn ready(scene: &Scene, firmware: Option<&Path>, wishes: Wishes) -> Result<Option<Devices>, Failure> {
+pub(crate) fn ready(scene: &Scene, firmware: Option<&Path>, wishes: Wishes) -> Result<Option<Devices>, Failure> {
     let mut devices: Devices = scene.peers.iter().map(|_| None).collect();
     #[cfg(feature = "falcon")]
     {

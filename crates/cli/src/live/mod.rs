@@ -1,7 +1,7 @@
 //! `cohaptic live`: runs a scene by the wall clock, with peers attached by network or as Falcons.
 
-mod answer;
-mod devices;
+pub(crate) mod answer;
+pub(crate) mod devices;
 pub(crate) mod onlookers;
 mod page;
 
@@ -9,13 +9,14 @@ use std::fmt::Write as _;
 use std::net::SocketAddr;
 use std::path::Path;
 use std::process::ExitCode;
-use std::sync::mpsc::channel;
+use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::Duration;
 
 use cohaptic_harness::Model;
-use cohaptic_live::{Report, Session, SessionConfig, SessionError, SessionKey, SystemEntropy};
-use cohaptic_scene::{KeysOfLinks, PeerKind, Scene, SceneContent, link_key_changes_of_text, link_keys_of_text, scene_content_of_text};
+use cohaptic_harness::live::RecordedScene;
+use cohaptic_live::{OtherScene, Report, Session, SessionConfig, SessionError, SessionKey, SystemEntropy};
+use cohaptic_scene::{Fingerprint, KeysOfLinks, PeerKind, Scene, SceneContent, link_key_changes_of_text, link_keys_of_text, scene_content_of_text};
 use cohaptic_units::Instant;
 use cohaptic_units::print::{Counted, Span};
 
@@ -60,6 +61,8 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     // The text is read before the session, which may last long, so that the page shows the scene of the session.
     let text = input::text(path)?;
     let scene = input::with(path, |text, file| Scene::parse_live(text, file, overrides))?;
+    // The scene without the length of this session, which other computers need not know.
+    let identity = RecordedScene::fingerprint_of(&input::with(path, |text, file| Scene::parse_live(text, file, &arguments.overrides.set))?);
     if scene.topology.is_some() {
         let message = "in a live session every peer sends to every other: expected a scene without [topology], or kind = \"full\"";
         return Err(Failure::Input(format!("{}: topology: {message}", input::named(path).display())));
@@ -87,12 +90,13 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let content = input::with(path, |text, file| scene_content_of_text(text, file, overrides))?;
     let timeline = edits(&content.keys);
     let _own = arguments.out.as_deref().map(own_folder).transpose()?;
-    let session = open(arguments, &scene, content)?;
+    let session = open(arguments, &scene, content, identity)?;
     let Some(session) = session else { return Ok(ExitCode::from(INTERRUPTED)) };
-    announce(&scene, session.address(), arguments.key_file.is_some());
+    announce(&scene, session.address(), arguments.key_file.is_some().then_some(identity));
     let control = LiveControl::open(&arguments.real_time, onlookers::description(&scene, &pairs), Box::new(editor))?;
-    let host = SessionConductor::new(control.look(), wanted, pairs, elapsed, scene.axes.count());
-    let mut report = conduct(&scene, session, host, &control)?;
+    let (others, strangers) = channel();
+    let host = SessionConductor::new(control.look(), wanted, pairs, elapsed, scene.axes.count(), others);
+    let mut report = conduct(&scene, session, host, &control, &strangers)?;
     if let Some(folder) = &arguments.out {
         let file = folder.join("live.html");
         write_file(&file, page::html(arguments, path, &Played { scene: &scene, text: &text, overrides, timeline: &timeline }, &report))?;
@@ -113,7 +117,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
 }
 
 /// Opens the key, the devices and the sockets before the time of the session begins. Returns `None` if the user asked for the end while waiting.
-fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent) -> Result<Option<Session>, Failure> {
+fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent, identity: Fingerprint) -> Result<Option<Session>, Failure> {
     let real_time = &arguments.real_time;
     // The key is read first: a wrong file is refused before devices are homed.
     let key = match &arguments.key_file {
@@ -123,19 +127,26 @@ fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent) -> Resu
     let config = SessionConfig {
         allow_remote: real_time.allow_remote,
         key,
-        pacing: real_time.pacing(),
-        wishes: real_time.wishes(),
-        tolerance: real_time.tolerance(),
+        pacing: real_time.pace.pacing(),
+        wishes: real_time.pace.wishes(),
+        tolerance: real_time.pace.tolerance(),
         out: arguments.out.clone(),
         content,
+        identity: Some(identity),
         ..SessionConfig::new(arguments.listen)
     };
     // Simulated devices take time to home. The sockets are opened afterwards, so that peers find a session that is about to begin.
-    let Some(mut devices) = devices::ready(scene, arguments.firmware.as_deref(), real_time.wishes())? else { return Ok(None) };
+    let Some(mut devices) = devices::ready(scene, arguments.firmware.as_deref(), real_time.pace.wishes())? else { return Ok(None) };
     Session::open(scene, config, |peer| devices[peer].take()).map(Some).map_err(refused)
 }
 
-fn conduct(scene: &Scene, session: Session, mut host: SessionConductor, control: &LiveControl) -> Result<Report, Failure> {
+fn conduct(
+    scene: &Scene,
+    session: Session,
+    mut host: SessionConductor,
+    control: &LiveControl,
+    strangers: &Receiver<OtherScene>,
+) -> Result<Report, Failure> {
     // From the first sample on, the session has a record worth keeping, and the session asks the conductor 50 times per second whether to go on. A signal
     // therefore ends the session in order.
     interrupt::has_results();
@@ -149,6 +160,7 @@ fn conduct(scene: &Scene, session: Session, mut host: SessionConductor, control:
             let latest = control.latest();
             progress.reach(Instant::ZERO.saturating_add(latest.elapsed));
             progress.note(onlookers::note(scene, &latest));
+            strangers.try_iter().for_each(|other| say(&answer::other_scene(scene, &other)));
         }
         running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)).map_err(refused)
     });
@@ -164,12 +176,13 @@ pub(crate) fn refused(error: SessionError) -> Failure {
     if is_of_system { Failure::System(error.to_string()) } else { Failure::Input(error.to_string()) }
 }
 
-/// Prints the address for the datagrams of remote peers, if the scene has remote peers.
-fn announce(scene: &Scene, address: Option<SocketAddr>, has_key: bool) {
+/// Prints the address for the datagrams of remote peers, if the scene has remote peers. `key`: fingerprint of the scene, in a session with a key.
+fn announce(scene: &Scene, address: Option<SocketAddr>, key: Option<Fingerprint>) {
     let Some(address) = address else { return };
     let peers = scene.peers.iter().enumerate().filter(|(_, peer)| matches!(peer.kind, PeerKind::Udp(_)));
     let peers: Vec<String> = peers.map(|(place, peer)| format!("{} at place {place}", peer.name)).collect();
-    let key = if has_key { "with its key" } else { "without a key" };
+    // Only a peer with the key is asked for its scene.
+    let key = key.map_or_else(|| "without a key".to_owned(), |identity| format!("with its key, scene {identity}"));
     say(&format!("listening on {address} for {}: session {}, {}, {key}", peers.join(", "), scene.seed, Counted(scene.axes.count(), "axis")));
     if let Some(own) = own_address(address) {
         say(&format!("programs on other machines send to {own}"));

@@ -4,13 +4,13 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{Receiver, Sender};
 
 use cohaptic_control::{
-    Body, Description, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Presence as Shown, Snapshot, TurnView,
+    Body, Description, JoinedView, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Presence as Shown, Snapshot, TurnView,
 };
 use cohaptic_harness::live::Presence;
-use cohaptic_live::{Conductor, LinkChange, LinkStatus, PeerStatus, Refusal, Status};
+use cohaptic_live::{Conductor, Connection, LinkChange, LinkStatus, OtherScene, PeerStatus, Refusal, Status};
 use cohaptic_scene::{LinkKeys, MeasureName, Scene};
 use cohaptic_units::Instant;
 
@@ -27,11 +27,20 @@ pub(super) struct SessionConductor {
     elapsed: Elapsed,
     /// Number of axes of the scene. Positions and forces in snapshots have this length.
     axes: usize,
+    /// Peers that asked with another scene, for the thread that prints.
+    others: Sender<OtherScene>,
 }
 
 impl SessionConductor {
-    pub(super) const fn new(look: Option<Look>, wanted: Receiver<Edit>, pairs: Vec<(usize, usize)>, elapsed: Elapsed, axes: usize) -> Self {
-        Self { look, wanted, pairs, elapsed, axes }
+    pub(super) const fn new(
+        look: Option<Look>,
+        wanted: Receiver<Edit>,
+        pairs: Vec<(usize, usize)>,
+        elapsed: Elapsed,
+        axes: usize,
+        others: Sender<OtherScene>,
+    ) -> Self {
+        Self { look, wanted, pairs, elapsed, axes, others }
     }
 }
 
@@ -49,6 +58,11 @@ impl Conductor for SessionConductor {
         if let Some(look) = &self.look {
             look.publish(snapshot(&status, self.axes));
         }
+    }
+
+    fn notice_other_scene(&mut self, other: OtherScene) {
+        // The channel has no bound, so sending does not wait. Without a receiver the session has ended.
+        let _ = self.others.send(other);
     }
 
     fn wants_status(&self) -> bool {
@@ -134,7 +148,19 @@ fn view(peer: &PeerStatus, axes: usize, now: Instant) -> PeerView {
         device: state.device.map(|device| device.position),
         device_orientation: turn.device.map(|device| device.orientation),
     });
-    PeerView { status, age, position: state.object.position[..axes].to_vec(), force: peer.force[..axes].to_vec(), turn }
+    PeerView {
+        status,
+        age,
+        position: state.object.position[..axes].to_vec(),
+        force: peer.force[..axes].to_vec(),
+        turn,
+        joined: peer.connection.as_ref().map(joined),
+    }
+}
+
+fn joined(connection: &Connection) -> JoinedView {
+    let Connection { address, label, lost, sent } = *connection;
+    JoinedView { device: label.text().unwrap_or("udp").to_owned(), address: address.ip().to_canonical().to_string(), lost, sent }
 }
 
 /// Changes of the timeline, ordered by instant: the changed links, by index in the description, and the keys of each link from this instant on.

@@ -79,9 +79,9 @@ fn command_line(arguments: &LiveArguments, path: &Path, report: &Report) -> Stri
     let real_time = &arguments.real_time;
     CommandLine::new("live", path, &arguments.overrides.set)
         .option("--for", arguments.length.map(Span))
-        .option("--tolerance", real_time.tolerance.map(Span))
-        .flag("--spin", real_time.spin)
-        .flag("--no-priority", real_time.no_priority)
+        .option("--tolerance", real_time.pace.tolerance.map(Span))
+        .flag("--spin", real_time.pace.spin)
+        .flag("--no-priority", real_time.pace.no_priority)
         // Without peers in other programs, nothing listens.
         .option("--listen", report.admission.as_ref().map(|_| arguments.listen))
         .option("--key-file", arguments.key_file.as_deref().map(output::path))

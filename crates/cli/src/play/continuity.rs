@@ -58,7 +58,7 @@ fn run(played: &PlayedScene, pointer: &Pointer, begin: u64, ticks: u64) -> (Felt
         }
         let Ok(()) = live.handle_timeout(Instant::from_nanos(tick * TICK), &mut felt);
     }
-    let stands = |peer: usize| PeerStatus { state: live.peer(peer).unwrap(), force: [0.0; 3], seat: None };
+    let stands = |peer: usize| PeerStatus { state: live.peer(peer).unwrap(), force: [0.0; 3], seat: None, connection: None };
     (felt, (0..scene.peers.len()).map(stands).collect())
 }
 

@@ -166,7 +166,7 @@ mod tests {
         let packet = EndedPacket { from: 0, to: 2, after: Duration::from_micros(24_040), is_lost: true };
         let motion = Motion {
             elapsed: Duration::from_millis(1500),
-            peers: vec![PeerStatus { state: seen, force: [1.0, -0.5, 7.0], seat: None }],
+            peers: vec![PeerStatus { state: seen, force: [1.0, -0.5, 7.0], seat: None, connection: None }],
             task: Some(TaskView {
                 target: Target { position: [0.1, 0.0, 7.0], orientation: Some([1.0, 0.0, 0.0, 0.0]) },
                 radius: Some(0.005),

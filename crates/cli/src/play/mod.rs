@@ -144,9 +144,9 @@ fn prepare(
     let folder = played.file().parent().map(Path::to_path_buf).unwrap_or_default();
     let (changes, wanted) = channel();
     let config = SessionConfig {
-        pacing: real_time.pacing(),
-        wishes: real_time.wishes(),
-        tolerance: real_time.tolerance(),
+        pacing: real_time.pace.pacing(),
+        wishes: real_time.pace.wishes(),
+        tolerance: real_time.pace.tolerance(),
         out: Some(records.begin(number, &text)?),
         recorded: Recorded::Inputs,
         content,

@@ -262,7 +262,12 @@ mod tests {
         let object = State { position: [x, -x, 0.0], velocity: [0.1, x / 3.0, 0.0] };
         let device = State { position: [x + 0.001, 0.0, 0.0], velocity: [0.0, 0.2, 0.0] };
         let presence = if place == 0 { Presence::Present } else { Presence::Absent };
-        PeerStatus { state: PeerState { presence, heard: None, device: Some(device), object, turn: None }, force: [0.0; 3], seat: None }
+        PeerStatus {
+            state: PeerState { presence, heard: None, device: Some(device), object, turn: None },
+            force: [0.0; 3],
+            seat: None,
+            connection: None,
+        }
     }
 
     #[test]

@@ -9,14 +9,14 @@ use std::time::Duration;
 
 use cohaptic_realtime::{Pacing, Tolerance, Wishes};
 
-use crate::arguments::RealTimeArguments;
+use crate::arguments::PaceArguments;
 
 pub(crate) use addresses::{own_address, reached_from_elsewhere};
 pub(crate) use control::{Edit, KeyedLinks, LiveControl, Look, counters, quantiles, quantiles_of, refused_server, token_of};
 pub(crate) use control_files::ControlFiles;
 pub(crate) use words::{ConfiguredDelay, Publisher, carried, counts, late, notes, say, some_length, status};
 
-impl RealTimeArguments {
+impl PaceArguments {
     /// Returns how the thread waits for its next deadline: by spinning with `--spin`, otherwise by sleeping.
     pub(crate) const fn pacing(&self) -> Pacing {
         if self.spin { Pacing::SPIN } else { Pacing::Sleep }

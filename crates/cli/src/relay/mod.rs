@@ -35,8 +35,8 @@ pub(crate) fn relay(arguments: &RelayArguments) -> Result<ExitCode, Failure> {
     let editor = KeyedLinks { keys: std::mem::take(&mut setup.keys), folder: setup.folder.clone(), files, changes };
     let control = LiveControl::open(&arguments.real_time, description(&setup), Box::new(editor))?;
     let options = RunOptions {
-        pacing: arguments.real_time.pacing(),
-        wishes: arguments.real_time.wishes(),
+        pacing: arguments.real_time.pace.pacing(),
+        wishes: arguments.real_time.pace.wishes(),
         tolerance: setup.tolerance,
         duration: length,
         ..RunOptions::default()

@@ -58,7 +58,7 @@ impl Setup {
         let file = input::with(path, |text, file| RelayFile::parse(text, file, &overrides))?;
         // The configuration has models of links without the keys. Live control shows and changes keys, so that these are read from the text once more.
         let keys = input::with(path, |text, file| relay_link_keys_of_text(text, file, &overrides))?;
-        let tolerance = arguments.real_time.tolerance.unwrap_or(file.limits.tolerance);
+        let tolerance = arguments.real_time.pace.tolerance.unwrap_or(file.limits.tolerance);
         Ok(Self {
             title: file.title.clone(),
             tolerance: Tolerance { limit: tolerance },
@@ -89,7 +89,7 @@ impl Setup {
         Ok(Self {
             title: format!("{listen} -> {to}"),
             config: RelayConfig { seed: arguments.seed.unwrap_or(0), form: Form::Proxy(proxy), limits, changes: Vec::new() },
-            tolerance: arguments.real_time.tolerance(),
+            tolerance: arguments.real_time.pace.tolerance(),
             // Node 0 stands for all clients, node 1 for the server.
             nodes: vec!["client".to_owned(), "server".to_owned()],
             pairs: vec![(NodeId(0), NodeId(1)), (NodeId(1), NodeId(0))],

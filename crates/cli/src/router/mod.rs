@@ -27,7 +27,7 @@ pub(crate) fn router(arguments: &RouterArguments) -> Result<ExitCode, Failure> {
     let until = some_length(arguments.length)?.map(|length| Instant::ZERO.saturating_add(length));
     let file = input::with(&arguments.file, |text, file| RouterFile::parse(text, file, &arguments.set))?;
     let real_time = &arguments.real_time;
-    let mut router = Router::open(&file, real_time.pacing()).map_err(|error| Failure::System(error.to_string()))?;
+    let mut router = Router::open(&file, real_time.pace.pacing()).map_err(|error| Failure::System(error.to_string()))?;
     say(&format!("between {} and {}", attached(&file, Side::Left), attached(&file, Side::Right)));
     let (changes, wanted) = channel();
     // Each direction of a link has keys of its own, because live control can change one direction alone. Lanes 2 n and 2 n + 1 are the directions of link n.
@@ -127,8 +127,8 @@ fn route(
 ) -> RouterRun {
     /// Longest time until the router takes up a change.
     const LOOK: Duration = Duration::from_millis(20);
-    let prepared = prepare_thread(&arguments.real_time.wishes());
-    let tolerance = arguments.real_time.tolerance();
+    let prepared = prepare_thread(&arguments.real_time.pace.wishes());
+    let tolerance = arguments.real_time.pace.tolerance();
     let judged = |router: &Router| tolerance.judge(router.lateness(), "packets");
     let mut asked: Vec<ConfiguredDelay> = file.links.iter().flat_map(|link| [ConfiguredDelay::of(&link.model); 2]).collect();
     let ended = router.run(stop, until, LOOK, |router| {

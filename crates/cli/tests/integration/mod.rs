@@ -32,6 +32,8 @@ mod fit_programs;
 mod help;
 #[cfg(unix)]
 mod interrupt;
+#[cfg(target_os = "linux")]
+mod join;
 mod link;
 #[cfg(unix)]
 mod live;

@@ -29,7 +29,7 @@ fn file(left: &str, right: &str) -> String {
 }
 
 /// Runs the test of that name again in a process with a network and a user of its own; says whether this is that process.
-fn is_inside(name: &str) -> bool {
+pub(crate) fn is_inside(name: &str) -> bool {
     if env::var_os(INSIDE).is_some() {
         return true;
     }

@@ -65,6 +65,13 @@ impl Running {
         self.end()
     }
 
+    /// Kills the command at once: it cannot finish anything.
+    pub(crate) fn kill(mut self) {
+        let mut child = self.child.take().unwrap();
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+
     /// Waits until the command ends by itself, and returns its outcome.
     pub(crate) fn end(self) -> Outcome {
         self.end_within(PATIENCE)

@@ -15,7 +15,8 @@ use tower::ServiceExt as _;
 use super::{App, Pace, People, Shown, router};
 use crate::token::Ticket;
 use crate::{
-    Board, Body as ObjectBody, Description, Guests, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Snapshot, TurnView,
+    Board, Body as ObjectBody, Description, Guests, JoinedView, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Snapshot,
+    TurnView,
 };
 
 pub(super) const TOKEN: &str = "a-token-of-more-than-22-characters";
@@ -157,6 +158,20 @@ fn attitudes_are_in_the_state_of_an_object_that_turns_alone() {
     assert_eq!(state["peers"][1]["orientation"], Value::Null);
     let state = shown(&still, None).to_string();
     assert!(["body", "grasp", "orientation", "device"].iter().all(|key| !state.contains(key)), "{state}");
+}
+
+#[test]
+fn a_program_that_joined_is_in_the_state_and_no_other_peer_has_the_entry() {
+    let names = |name: &str| PeerName { name: name.to_owned(), kind: "udp".to_owned() };
+    let peers = vec![names("left"), names("right")];
+    let description = Description { kind: Kind::Live, title: String::new(), links: vec![], peers, clocks: vec![], measures: vec![], body: None };
+    let joined = JoinedView { device: "falcon".to_owned(), address: "192.0.2.9".to_owned(), lost: 2, sent: 1000 };
+    let board = Board::new(description);
+    let peers = vec![PeerView { joined: Some(joined), ..PeerView::default() }, PeerView::default()];
+    board.publish(Arc::new(Snapshot { peers, ..Snapshot::default() })).unwrap();
+    let state = crate::views::state(&board.latest());
+    assert_eq!(state["peers"][0]["joined"], json!({ "device": "falcon", "address": "192.0.2.9", "lost": 2, "sent": 1000 }));
+    assert!(state["peers"][1].get("joined").is_none());
 }
 
 #[test]

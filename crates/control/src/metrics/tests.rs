@@ -143,6 +143,7 @@ fn example(strange: &str) -> (Description, Latest) {
         position: vec![0.25, f64::NAN],
         force: vec![f64::NEG_INFINITY],
         turn: None,
+        joined: None,
     };
     let snapshot = Snapshot {
         elapsed: Duration::from_millis(12_500),

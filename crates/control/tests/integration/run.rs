@@ -209,6 +209,7 @@ fn snapshot(elapsed: Duration, links: usize, peers: usize, axes: usize) -> Snaps
             age: (number > 0).then(|| Duration::from_secs_f64(if stale { 2.3 } else { 0.012 })),
             position: (0..axes).map(place).collect(),
             turn: None,
+            joined: None,
             force: (0..axes).map(|axis| 2.0 * (t + axis as f64).cos()).collect(),
         }
     };

@@ -13,7 +13,7 @@ mod rows;
 mod scene;
 
 pub use crate::rows::{Input, InputRow};
-pub use crate::world::live::{Datagram, GateStats, Presence, SampleError, SeatStats, Transmit, TurnState};
+pub use crate::world::live::{Datagram, Fade, GateStats, GatedDevice, Presence, SampleError, SeatStats, Transmit, TurnState};
 pub use inputs::{Inputs, InputsError};
 pub use recorded::{RecordedScene, SceneDifference};
 pub use replay::replay;

@@ -94,9 +94,13 @@ impl RecordedScene {
     /// scene but cannot name the difference.
     #[must_use]
     pub fn of(scene: &Scene, content: SceneContent) -> Self {
-        // Expectations do not change a run.
-        let bare = Scene { expect: None, ..scene.clone() };
-        Self { program: PROGRAM.to_owned(), fingerprint: bare.fingerprint(), content }
+        Self { program: PROGRAM.to_owned(), fingerprint: Self::fingerprint_of(scene), content }
+    }
+
+    /// Returns the fingerprint that a record has of a scene, without the expectations of the scene: expectations do not change a run.
+    #[must_use]
+    pub fn fingerprint_of(scene: &Scene) -> Fingerprint {
+        Scene { expect: None, ..scene.clone() }.fingerprint()
     }
 
     /// Reads the identity from the text of a record of inputs; `None` if the record has none, as records of early versions.

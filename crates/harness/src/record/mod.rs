@@ -34,3 +34,4 @@ pub use links::links_csv;
 pub use pictures::{Pictures, RecordedPicture};
 pub use plot::SANE_POSITION;
 pub use recorder::Recorder;
+pub use trajectory::Trajectory;

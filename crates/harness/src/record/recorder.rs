@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use cohaptic_picture::Size;
 use cohaptic_scene::Scene;
 
-use super::file::{RecordError, create_folder};
+use super::file::RecordError;
 use super::links;
 use super::packets::Packets;
 use super::pictures::{Pictures, RecordedPicture};
 use super::plot;
 use super::task::TaskRecord;
-use super::trajectory::{Trajectory, Turns};
+use super::trajectory::Trajectory;
 use crate::{Observer, PacketRow, Summary, TickRow};
 
 /// Writes `trajectory.csv` and `packets.csv` during the run, and the remaining files in [`Recorder::finish`].
@@ -33,11 +33,12 @@ impl Recorder {
     ///
     /// [`RecordError`] if the folder or a file cannot be created.
     pub fn create(folder: &Path, scene: &Scene) -> Result<Self, RecordError> {
-        create_folder(folder)?;
-        let names: Vec<String> = scene.peers.iter().map(|peer| peer.name.clone()).collect();
+        // The first file creates the folder.
+        let trajectory = Trajectory::of_scene(folder, scene)?;
+        let names = scene.peers.iter().map(|peer| peer.name.clone()).collect();
         Ok(Self {
             folder: folder.to_path_buf(),
-            trajectory: Trajectory::create(folder, names.clone(), scene.axes, Turns::of(scene))?,
+            trajectory,
             packets: Packets::create(folder, names)?,
             task: TaskRecord::create(folder, scene)?,
             pictures: Pictures::new(scene),

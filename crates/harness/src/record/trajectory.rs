@@ -6,7 +6,7 @@ use cohaptic_peer::rotation::Attitude;
 use cohaptic_scene::{Axes, Scene};
 use cohaptic_units::Instant;
 
-use super::file::{RecordFile, push_f64, push_seconds};
+use super::file::{RecordFile, create_folder, push_f64, push_seconds};
 use crate::TickRow;
 use crate::record::RecordError;
 
@@ -40,7 +40,7 @@ fn push_attitude(line: &mut Vec<u8>, attitude: &Attitude) {
 /// Writes the columns `t,peer,xh,vh,xo,vo,xd,vd,fc,ft`. A second axis adds `yh,vyh,yo,vyo,yd,vyd,fcy,fty`, and a third axis the same columns with z. If the
 /// object turns, the attitude of the copy and the torques follow. If any device turns, the attitude of the device follows, empty for devices that do not turn.
 #[derive(Debug)]
-pub(crate) struct Trajectory {
+pub struct Trajectory {
     file: RecordFile,
     names: Vec<String>,
     turn: Turns,
@@ -52,7 +52,17 @@ pub(crate) struct Trajectory {
 }
 
 impl Trajectory {
-    pub(crate) fn create(folder: &Path, names: Vec<String>, axes: Axes, turn: Turns) -> Result<Self, RecordError> {
+    /// Creates the folder if needed and begins `trajectory.csv` for peers of the scene.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError`] if the folder or the file cannot be created.
+    pub fn of_scene(folder: &Path, scene: &Scene) -> Result<Self, RecordError> {
+        create_folder(folder)?;
+        Self::create(folder, scene.peers.iter().map(|peer| peer.name.clone()).collect(), scene.axes, Turns::of(scene))
+    }
+
+    fn create(folder: &Path, names: Vec<String>, axes: Axes, turn: Turns) -> Result<Self, RecordError> {
         // Columns of the first axis have no axis in their names, so records of one axis stay as they are.
         let mut file = RecordFile::create(folder.join("trajectory.csv"))?;
         file.write(b"t,peer,xh,vh,xo,vo,xd,vd,fc,ft")?;
@@ -69,7 +79,12 @@ impl Trajectory {
         Ok(Self { file, names, turn, at: None, beginning: Vec::new(), line: Vec::new() })
     }
 
-    pub(crate) fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), RecordError> {
+    /// Writes the row of a tick. Rows must come in the order of time.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError`] if the row cannot be written.
+    pub fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), RecordError> {
         let line = &mut self.line;
         line.clear();
         // All rows of an instant begin with the same text, which is formatted once.
@@ -110,7 +125,12 @@ impl Trajectory {
         self.file.write(line)
     }
 
-    pub(crate) fn finish(self) -> Result<std::path::PathBuf, RecordError> {
+    /// Gives the file its name, and returns the name.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError`] if the rest cannot be written or the file cannot be renamed.
+    pub fn finish(self) -> Result<std::path::PathBuf, RecordError> {
         self.file.finish()
     }
 }

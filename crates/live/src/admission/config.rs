@@ -51,13 +51,17 @@ pub struct AdmissionConfig {
     pub stale_after: Duration,
     /// Limits of position and velocity. `None`: every finite sample is admitted.
     pub limits: Option<Limits>,
+    /// Fingerprint of the scene. A hello with another fingerprint is refused; a hello with the fingerprint 0 tells none and is answered. 0: every hello is
+    /// answered.
+    pub scene: u64,
 }
 
 impl AdmissionConfig {
-    /// Returns a configuration for samples of states, without a key, without limits, and with one second until a silent peer counts as gone.
+    /// Returns a configuration for samples of states, without a key, without limits, for peers of any scene, and with one second until a silent peer counts
+    /// as gone.
     #[must_use]
     pub const fn new(session: u64, axes: usize, peers: u32, update: Duration, seats: Vec<Seat>) -> Self {
-        Self { session, axes, kind: SampleKind::State, peers, update, seats, key: None, stale_after: Duration::from_secs(1), limits: None }
+        Self { session, axes, kind: SampleKind::State, peers, update, seats, key: None, stale_after: Duration::from_secs(1), limits: None, scene: 0 }
     }
 
     /// Returns the configuration with the session key `key`, or without a key if `None`.

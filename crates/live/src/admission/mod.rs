@@ -87,8 +87,9 @@ impl Admitted {
 ///   with every sealed sample. So the session can derive the keys again when a sample needs the keys.
 /// - When a seat is taken, every earlier server nonce for the seat becomes void. A sample recorded in an earlier joining, or sent from another address, then
 ///   has a wrong tag.
-/// - A hello changes nothing, and each hello with a right tag is answered. A limit on the number of answers would be used up by a flood of recorded hellos. A
-///   host that repeats recorded hellos gets welcomes that the host cannot use. `docs/live-protocol.md` has the argument, attacker by attacker.
+/// - A hello changes nothing but the label that displays show, and each hello with a right tag for the session's scene is answered. A limit on the number of
+///   answers would be used up by a flood of recorded hellos. A host that repeats recorded hellos gets welcomes that the host cannot use.
+///   `docs/live-protocol.md` has the argument, attacker by attacker.
 ///
 /// Memory is bounded by the number of seats. Inside the session the sequence numbers of a seat never go back: an admitted sample has the number of the joining
 /// in its upper 24 bits and the peer's own number in the lower 40 bits. A peer that joins again and counts from 0 is therefore newer than before.
@@ -106,11 +107,28 @@ pub struct AdmissionControl {
     key: Option<SessionKey>,
     stale_after: Duration,
     limits: Option<Limits>,
+    /// Fingerprint of the scene, to which hellos are compared. 0: hellos are not compared.
+    scene: u64,
+    /// Latest hello with a right tag and the fingerprint of another scene.
+    other_scene: Option<OtherScene>,
     /// Secret key of the hash for server nonces. Drawn anew for each session, so that no two sessions give the same nonces.
     secret: Secret,
     /// Seats, sorted by place, so that a place is found by binary search.
     seats: Vec<SeatState>,
     stats: AdmissionStats,
+}
+
+/// Peer whose scene is not that of the session.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct OtherScene {
+    /// Place for which the peer asked.
+    pub place: Place,
+    /// Address of the peer.
+    pub from: SocketAddr,
+    /// Fingerprint of the peer's scene.
+    pub theirs: u64,
+    /// Fingerprint of the session's scene.
+    pub ours: u64,
 }
 
 /// Key of the server nonces. Overwritten when dropped, and never printed.
@@ -141,12 +159,26 @@ impl AdmissionControl {
         config.check()?;
         let mut secret = Zeroizing::new([0; 32]);
         entropy.fill(&mut secret[..])?;
-        let AdmissionConfig { session, axes, kind, peers, update, mut seats, key, stale_after, limits } = config;
+        let AdmissionConfig { session, axes, kind, peers, update, mut seats, key, stale_after, limits, scene } = config;
         // `find` searches the seats by place.
         seats.sort_by_key(|seat| seat.place);
         let seats = seats.into_iter().map(SeatState::free).collect();
         let secret = Secret(secret);
-        Ok(Self { session, axes, kind, peers, update, key, stale_after, limits, secret, seats, stats: AdmissionStats::default() })
+        Ok(Self {
+            session,
+            axes,
+            kind,
+            peers,
+            update,
+            key,
+            stale_after,
+            limits,
+            scene,
+            other_scene: None,
+            secret,
+            seats,
+            stats: AdmissionStats::default(),
+        })
     }
 
     /// Decides about a datagram received from the address `from` at the instant `now`.
@@ -188,6 +220,12 @@ impl AdmissionControl {
         &self.stats
     }
 
+    /// Returns the latest peer that asked with the fingerprint of another scene, under the right key.
+    #[must_use]
+    pub const fn other_scene(&self) -> Option<OtherScene> {
+        self.other_scene
+    }
+
     /// Returns the status of every seat at the instant `now`, sorted by place.
     pub fn seats(&self, now: Instant) -> impl Iterator<Item = SeatStatus<'_>> {
         self.seats.iter().map(move |seat| seat.status(now, self.stale_after))
@@ -213,25 +251,32 @@ impl AdmissionControl {
     }
 
     /// Answers a hello. The decision depends neither on the time nor on earlier hellos: otherwise the hellos of an attacker could keep another peer from the
-    /// welcome.
-    fn handle_hello(&self, from: SocketAddr, datagram: &[u8]) -> Result<Admission, Refusal> {
+    /// welcome. A hello leaves nothing but its label and, with the fingerprint of another scene, a note for displays.
+    fn handle_hello(&mut self, from: SocketAddr, datagram: &[u8]) -> Result<Admission, Refusal> {
         let unchecked = Hello::decode(datagram).map_err(Refusal::of_hello)?;
         // Without a key there is nothing to answer; the hello is counted under a cause that tells the sender's mistake.
         let Some(key) = &self.key else { return Err(Refusal::Keyless) };
-        let Hello { session, place, client_nonce } = unchecked.hello;
+        let Hello { session, place, client_nonce, scene, label } = unchecked.hello;
         if session != self.session {
             return Err(Refusal::ForeignSession);
         }
         let index = self.find(place).ok_or(Refusal::UnknownSeat)?;
         // The tag is checked last, because the hash costs more than all other checks.
         unchecked.verify(key).map_err(Refusal::of_hello)?;
+        // Compared after the tag, so that only a holder of the key can make the session show a fingerprint.
+        if scene != 0 && self.scene != 0 && scene != self.scene {
+            self.other_scene = Some(OtherScene { place, from, theirs: scene, ours: self.scene });
+            return Err(Refusal::OtherScene);
+        }
         let server_nonce = self.server_nonce(index, from);
         let tick = self.seats[index].tick();
         let axes = u8::try_from(self.axes).expect("at most three");
         let Self { peers, update, kind, .. } = *self;
         let turns = kind == SampleKind::Attitude;
         let welcome = Welcome { axes, turns, session, place, peers, client_nonce, server_nonce, tick, update };
-        Ok(Admission::Reply { to: from, bytes: welcome.encode(key) })
+        let bytes = welcome.encode(key);
+        self.seats[index].introduce(from, label);
+        Ok(Admission::Reply { to: from, bytes })
     }
 
     /// Decides about a sample. Format, session and seat are checked before the tag, because the hash costs more. State changes only after all checks, in

@@ -52,11 +52,13 @@ pub enum Refusal {
     Replayed,
     /// The seat was taken 2²⁴ times, so that the numbers of joinings are used up.
     JoiningsUsedUp,
+    /// The hello has the right tag and tells another scene than that of the session.
+    OtherScene,
 }
 
 impl Refusal {
     /// All causes, in the order of their counters.
-    pub(crate) const ALL: [Self; 21] = [
+    pub(crate) const ALL: [Self; 22] = [
         Self::TooShort,
         Self::Oversized,
         Self::Magic,
@@ -78,6 +80,7 @@ impl Refusal {
         Self::NotJoined,
         Self::Replayed,
         Self::JoiningsUsedUp,
+        Self::OtherScene,
     ];
 
     /// Returns the name of the cause in documents and tables.
@@ -105,6 +108,7 @@ impl Refusal {
             Self::NotJoined => "not-joined",
             Self::Replayed => "replayed",
             Self::JoiningsUsedUp => "joinings-used-up",
+            Self::OtherScene => "other-scene",
         }
     }
 

@@ -6,6 +6,7 @@ use std::net::SocketAddr;
 use cohaptic_units::Instant;
 
 use super::{JOININGS_END, Place, Refusal, SEQUENCE_BITS, Seat, Under};
+use crate::Label;
 use crate::seal::JoiningKeys;
 
 /// Status of a seat at an instant.
@@ -25,6 +26,10 @@ pub struct SeatStatus<'a> {
     pub joinings: u64,
     /// Number of samples admitted, in all joinings together.
     pub admitted: u64,
+    /// Label of the holder's device, as told by the hello of the present joining.
+    pub label: Label,
+    /// Sequence numbers missing between the first and the highest number of each joining: samples lost on the way to the session.
+    pub lost: u64,
 }
 
 /// A seat with the holder and the counts.
@@ -37,6 +42,10 @@ pub(super) struct SeatState {
     joinings: u64,
     /// Samples admitted, in all joinings together.
     admitted: u64,
+    /// Address and label of the latest hello with a right tag. The label becomes that of the holder when a sample from this address takes the seat.
+    introduced: Option<(SocketAddr, Label)>,
+    /// Sequence numbers missing in the joinings before the present joining.
+    lost_before: u64,
 }
 
 /// Holder of a seat, present or gone.
@@ -50,11 +59,24 @@ pub(super) struct Occupant {
     heard: Instant,
     /// Sequence numbers seen in the present joining.
     window: Window,
+    /// First sequence number of the present joining.
+    first: u64,
+    /// Samples admitted in the present joining, at least one.
+    admitted: u64,
+    label: Label,
+}
+
+impl Occupant {
+    /// Returns the number of sequence numbers missing in the present joining.
+    const fn lost(&self) -> u64 {
+        // A late number below the first number makes the difference negative.
+        (self.window.highest - self.first + 1).saturating_sub(self.admitted)
+    }
 }
 
 impl SeatState {
     pub(super) const fn free(seat: Seat) -> Self {
-        Self { seat, occupant: None, joinings: 0, admitted: 0 }
+        Self { seat, occupant: None, joinings: 0, admitted: 0, introduced: None, lost_before: 0 }
     }
 
     pub(super) const fn place(&self) -> Place {
@@ -69,6 +91,11 @@ impl SeatState {
         self.joinings
     }
 
+    /// Notes the label of a hello with a right tag. Only displays use the label, so that a repeated hello can do no more than take a label away.
+    pub(super) const fn introduce(&mut self, from: SocketAddr, label: Label) {
+        self.introduced = Some((from, label));
+    }
+
     pub(super) const fn occupant(&self) -> Option<&Occupant> {
         self.occupant.as_ref()
     }
@@ -79,7 +106,7 @@ impl SeatState {
     }
 
     pub(super) fn status(&self, now: Instant, stale_after: Duration) -> SeatStatus<'_> {
-        let Self { seat, occupant, joinings, admitted, .. } = self;
+        let Self { seat, occupant, joinings, admitted, lost_before, .. } = self;
         SeatStatus {
             place: seat.place,
             name: &seat.name,
@@ -88,6 +115,8 @@ impl SeatState {
             present: self.present(now, stale_after).is_some(),
             joinings: *joinings,
             admitted: *admitted,
+            label: occupant.as_ref().map_or(Label::NONE, |occupant| occupant.label),
+            lost: lost_before + occupant.as_ref().map_or(0, Occupant::lost),
         }
     }
 
@@ -114,8 +143,10 @@ impl SeatState {
         }
         self.joinings += 1;
         self.admitted += 1;
+        self.lost_before += self.occupant.as_ref().map_or(0, Occupant::lost);
+        let label = self.introduced.filter(|(address, _)| *address == from).map_or(Label::NONE, |(_, label)| label);
         // The window begins anew, because a peer that joins may count from any number.
-        self.occupant = Some(Occupant { address: from, keys, heard: now, window: Window::beginning_with(number) });
+        self.occupant = Some(Occupant { address: from, keys, heard: now, window: Window::beginning_with(number), first: number, admitted: 1, label });
         Ok(true)
     }
 
@@ -127,6 +158,7 @@ impl SeatState {
         }
         // Only an admitted sample counts as heard: repetitions must not keep a silent peer present.
         occupant.heard = now;
+        occupant.admitted += 1;
         self.admitted += 1;
         Ok(false)
     }

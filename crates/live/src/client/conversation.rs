@@ -7,8 +7,8 @@ use cohaptic_peer::wire::{Extra, Sample, SampleKind};
 use cohaptic_units::Instant;
 
 use super::{Joined, Joining};
-use crate::handshake::HANDSHAKE_LEN;
-use crate::{Entropy, EntropyError, MAX_DATAGRAM, Place, SessionKey};
+use crate::handshake::{HANDSHAKE_LEN, Welcome};
+use crate::{Entropy, EntropyError, Label, MAX_DATAGRAM, Place, SessionKey};
 
 /// Time between two hellos while no welcome comes.
 pub(crate) const HELLO_EVERY: Duration = Duration::from_millis(250);
@@ -77,6 +77,8 @@ pub struct Client {
     key: Option<SessionKey>,
     /// Parameters of the session. `None` before the first welcome.
     info: Option<SessionInfo>,
+    /// Fingerprint of the client's scene, and the label of the client's device, for hellos.
+    introduction: (u64, Label),
     /// Kind of the samples, until a welcome says otherwise.
     kind: SampleKind,
     /// Data beyond position and velocity in the sample opened last.
@@ -109,6 +111,7 @@ impl Client {
             place,
             key,
             info,
+            introduction: (0, Label::NONE),
             kind: SampleKind::State,
             extra: Extra::NONE,
             joined: None,
@@ -124,6 +127,12 @@ impl Client {
     #[must_use]
     pub fn with_kind(self, kind: SampleKind) -> Self {
         Self { kind, ..self }
+    }
+
+    /// Returns the client, with hellos that tell the fingerprint of the client's scene (0: not told) and the label of the client's device.
+    #[must_use]
+    pub fn introduced(self, scene: u64, label: Label) -> Self {
+        Self { introduction: (scene, label), ..self }
     }
 
     /// Returns the data beyond position and velocity of the sample returned last by [`Client::handle_datagram`].
@@ -142,6 +151,12 @@ impl Client {
     #[must_use]
     pub const fn info(&self) -> Option<&SessionInfo> {
         self.info.as_ref()
+    }
+
+    /// Returns the latest welcome. `None` before the first welcome, and in a session without a key.
+    #[must_use]
+    pub fn welcome(&self) -> Option<&Welcome> {
+        self.joined.as_ref().map(Joined::welcome)
     }
 
     /// Returns the number of welcomes taken.
@@ -176,7 +191,10 @@ impl Client {
         // A repeated hello has the same nonce, so that a late welcome for an earlier hello still fits.
         let joining = match self.joining.take() {
             Some(joining) => joining,
-            None => Joining::draw(self.session, self.place, key, entropy)?.with_kind(self.kind),
+            None => {
+                let (scene, label) = self.introduction;
+                Joining::draw(self.session, self.place, key, entropy)?.with_kind(self.kind).introduced(scene, label)
+            }
         };
         // The time counts from this call and not from the last deadline, so that a late call does not cause two hellos in a row.
         self.next_hello = now.saturating_add(HELLO_EVERY);

@@ -7,7 +7,7 @@ use cohaptic_peer::wire::SampleKind;
 
 use crate::handshake::{HANDSHAKE_LEN, HandshakeError, Hello, Welcome};
 use crate::seal::{JoiningKeys, MAX_DATAGRAM, NONCE_LEN, SEAL_LEN, Sealed};
-use crate::{Entropy, EntropyError, Nonce, Place, SessionKey};
+use crate::{Entropy, EntropyError, Label, Nonce, Place, SessionKey};
 
 /// Peer that asks for a seat: a hello without an answer so far.
 #[derive(Clone, Debug)]
@@ -22,7 +22,15 @@ impl Joining {
     /// Returns a joining for a session with samples of states, or of attitudes if the welcome says so. `client_nonce` must never have been used before.
     #[must_use]
     pub fn new(session: u64, place: Place, key: &SessionKey, client_nonce: Nonce) -> Self {
-        Self { hello: Hello { session, place, client_nonce }, key: key.clone(), kind: SampleKind::State }
+        Self { hello: Hello { session, place, client_nonce, scene: 0, label: Label::NONE }, key: key.clone(), kind: SampleKind::State }
+    }
+
+    /// Returns the joining with a hello that tells the fingerprint of the peer's scene and the label of its device. A session of another scene does not answer
+    /// such a hello. A `scene` of 0 does not tell the scene.
+    #[must_use]
+    pub const fn introduced(mut self, scene: u64, label: Label) -> Self {
+        (self.hello.scene, self.hello.label) = (scene, label);
+        self
     }
 
     /// Returns the joining, for a session with samples of the kind `kind`.
@@ -55,7 +63,7 @@ impl Joining {
     /// [`WelcomeError`] if `datagram` is no welcome or the welcome for another joining. Such a datagram should be ignored. Never panics.
     pub fn handle_welcome(&self, datagram: &[u8]) -> Result<Joined, WelcomeError> {
         let welcome = Welcome::decode(datagram, &self.key)?;
-        let Hello { session, place, client_nonce } = self.hello;
+        let Hello { session, place, client_nonce, .. } = self.hello;
         if (welcome.session, welcome.place, welcome.client_nonce) != (session, place, client_nonce) {
             return Err(WelcomeError::Other);
         }

@@ -7,5 +7,6 @@
 mod conversation;
 mod joining;
 
+pub(crate) use conversation::SILENCE;
 pub use conversation::{Client, ClientConfig, Heard, SessionInfo};
 pub use joining::{Joined, Joining, OpenError, WelcomeError};

@@ -8,7 +8,7 @@ use std::time::Duration;
 use cohaptic_harness::record::RecordError;
 use cohaptic_realtime::udp::BindError;
 use cohaptic_realtime::{Pacing, Tolerance, Wishes};
-use cohaptic_scene::SceneContent;
+use cohaptic_scene::{Fingerprint, SceneContent};
 
 use crate::{AdmissionConfigError, SessionKey};
 
@@ -34,6 +34,9 @@ pub struct SessionConfig {
     /// Keys and files of the scene, from [`cohaptic_scene::scene_content`], kept in the record. A replay with another scene names the differing keys and files.
     /// With empty content, a replay can only say that the scenes differ.
     pub content: SceneContent,
+    /// Fingerprint to which those of hellos are compared: a peer with another one is not answered. `None`: the fingerprint of the scene. A session that was
+    /// made shorter or longer than the scene says has the fingerprint of the scene as written here, so that peers need not know the length of the session.
+    pub identity: Option<Fingerprint>,
 }
 
 impl SessionConfig {
@@ -50,6 +53,7 @@ impl SessionConfig {
             out: None,
             recorded: Recorded::All,
             content: SceneContent::default(),
+            identity: None,
         }
     }
 }

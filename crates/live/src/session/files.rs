@@ -48,11 +48,12 @@ impl Releases {
     }
 }
 
-/// Writes `lateness.csv`, with columns `of,late_us,count`: number of ticks or releases per lateness. Latenesses are rounded to three digits by the histogram.
-pub(super) fn write_lateness(folder: &Path, ticks: &Lateness, releases: &Lateness) -> Result<PathBuf, RecordError> {
+/// Writes `lateness.csv`, with columns `of,late_us,count`: number of ticks or other events per lateness, for each named histogram. Latenesses are rounded to
+/// three digits by the histogram.
+pub(crate) fn write_lateness(folder: &Path, histograms: &[(&str, &Lateness)]) -> Result<PathBuf, RecordError> {
     let mut file = RecordFile::create(folder.join("lateness.csv"))?;
     file.write(b"of,late_us,count\n")?;
-    for (of, lateness) in [("tick", ticks), ("release", releases)] {
+    for (of, lateness) in histograms {
         for (late, count) in lateness.recorded() {
             let nanos = late.as_nanos();
             file.write(format!("{of},{}.{:03},{count}\n", nanos / 1000, nanos % 1000).as_bytes())?;

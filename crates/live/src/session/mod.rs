@@ -25,14 +25,19 @@ use cohaptic_scene::{LinkKeys, Scene};
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
 
+use crate::OtherScene;
+
 use motion::EndedPackets;
 use outside::Outside;
 use recording::{Recording, Stopped};
 use watch::Watch;
 
+pub(crate) use files::write_lateness;
+pub(crate) use rows::TickCopy;
+
 pub use config::{Recorded, SessionConfig, SessionError};
 pub use motion::{EndedPacket, Motion};
-pub use status::{LinkStatus, PeerStatus, Report, SocketCounts, Status};
+pub use status::{Connection, LinkStatus, PeerStatus, Report, SocketCounts, Status};
 
 /// Conductor of a session: observes the session, changes links, and ends the session. The session calls the conductor on the thread with the deadlines, so the
 /// methods must neither wait nor take long.
@@ -45,6 +50,10 @@ pub trait Conductor {
 
     /// Takes a snapshot of the session. Called about 17 times a second and once at the end, if [`Conductor::wants_status`].
     fn show(&mut self, status: Status);
+
+    /// Takes a peer that asked with the fingerprint of another scene. Called at a look after such a hello, once for each different peer, address or fingerprint
+    /// in a row.
+    fn notice_other_scene(&mut self, _other: OtherScene) {}
 
     /// Returns whether [`Conductor::show`] is to be called. The answer must not change during the session.
     fn wants_status(&self) -> bool {
@@ -87,6 +96,8 @@ pub struct Session {
     clock: MonotonicClock,
     /// `true` if writing the record has failed.
     is_stopped: bool,
+    /// Peer of another scene that the conductor was told last.
+    told: Option<OtherScene>,
 }
 
 /// Time between two calls of [`Session::look`].
@@ -110,7 +121,7 @@ impl Session {
         let recording = config.out.as_deref().map(|folder| Recording::create(folder, scene, config.content.clone(), config.recorded)).transpose()?;
         let peers = scene.peers.len();
         let (live, watch, clock) = (LiveScene::new(scene, devices), Watch::new(scene, recording), MonotonicClock::start());
-        Ok(Self { live, outside, watch, config, peers, clock, is_stopped: false })
+        Ok(Self { live, outside, watch, config, peers, clock, is_stopped: false, told: None })
     }
 
     /// Returns the local address of the socket. `None` in a scene without peers in other programs.
@@ -149,6 +160,8 @@ impl Session {
             seats: (0..self.peers).map(|peer| self.live.seat_stats(peer)).collect(),
             gates: (0..self.peers).map(|peer| self.live.gate_stats(peer)).collect(),
             admission: self.outside.as_ref().map(Outside::counts),
+            other_scene: self.outside.as_ref().and_then(Outside::other_scene),
+            connections: (0..self.peers).map(|peer| self.connection(peer)).collect(),
             prepared,
             files,
             pictures,
@@ -193,6 +206,11 @@ impl Session {
         while let Some(LinkChange { from, to, keys, model }) = conductor.next_change() {
             self.live.set_link(now, (from, to), &keys, &model, &mut self.watch)?;
         }
+        let other = self.outside.as_ref().and_then(Outside::other_scene);
+        if let Some(other) = other.filter(|_| other != self.told) {
+            self.told = Some(other);
+            conductor.notice_other_scene(other);
+        }
         // `stop` handles everything due until `now` first. Afterwards there is no deadline, and `is_over` ends the loop.
         if !conductor.keep_going() {
             self.live.set_clock(now);
@@ -221,9 +239,13 @@ impl Session {
     fn peers(&self) -> Vec<PeerStatus> {
         let peer = |place| {
             let state = self.live.peer(place)?;
-            Some(PeerStatus { state, force: self.watch.forces[place], seat: self.live.seat_stats(place) })
+            Some(PeerStatus { state, force: self.watch.forces[place], seat: self.live.seat_stats(place), connection: self.connection(place) })
         };
         (0..self.peers).filter_map(peer).collect()
+    }
+
+    fn connection(&self, peer: usize) -> Option<Connection> {
+        self.outside.as_ref().and_then(|outside| outside.connection(self.live.open(), peer))
     }
 
     fn motion(&mut self) -> Motion {
@@ -251,6 +273,7 @@ impl Session {
             peers: self.peers(),
             links: pairs.filter_map(link).collect(),
             admission: self.outside.as_ref().map(|outside| *outside.admission_stats()),
+            other_scene: self.outside.as_ref().and_then(Outside::other_scene),
         }
     }
 }

@@ -5,17 +5,17 @@ use std::net::SocketAddr;
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
-use cohaptic_harness::live::Transmit;
+use cohaptic_harness::live::{RecordedScene, Transmit};
 use cohaptic_realtime::udp::{self, ReceiveBuffers, UdpEndpoint};
 use cohaptic_realtime::{Clock as _, MonotonicClock};
 use cohaptic_scene::{PeerKind, Scene};
 use cohaptic_units::Instant;
 
 use super::files::Release;
-use super::status::SocketCounts;
+use super::status::{Connection, SocketCounts};
 use super::{SessionConfig, SessionError};
 use crate::handshake::HANDSHAKE_LEN;
-use crate::{Admission, AdmissionConfig, AdmissionControl, AdmissionStats, Limits, MAX_DATAGRAM, Place, Seat, SystemEntropy};
+use crate::{Admission, AdmissionConfig, AdmissionControl, AdmissionStats, Limits, MAX_DATAGRAM, OtherScene, Place, Seat, SystemEntropy};
 
 /// Socket and admission of a session, with the buffers of both directions.
 #[derive(Debug)]
@@ -69,6 +69,7 @@ impl Outside {
             stale_after,
             limits: Some(LIMITS),
             kind: scene.sample_kind(),
+            scene: config.identity.unwrap_or_else(|| RecordedScene::fingerprint_of(scene)).get(),
             ..AdmissionConfig::new(scene.seed, scene.axes.count(), peers, scene.coordination.update, seats)
         };
         let admission = AdmissionControl::new(admission.with_key(config.key.clone()), &mut SystemEntropy)?;
@@ -127,6 +128,16 @@ impl Outside {
 
     pub(super) const fn admission_stats(&self) -> &AdmissionStats {
         self.admission.stats()
+    }
+
+    pub(super) const fn other_scene(&self) -> Option<OtherScene> {
+        self.admission.other_scene()
+    }
+
+    /// Returns the connection to the program at the seat of a peer. `None` if no program ever took the seat, or if the peer is not another program.
+    pub(super) fn connection(&self, now: Instant, peer: usize) -> Option<Connection> {
+        let status = self.admission.seat(now, Place(u32::try_from(peer).ok()?))?;
+        Some(Connection { address: status.address?, label: status.label, lost: status.lost, sent: status.admitted + status.lost })
     }
 
     pub(super) fn counts(&self) -> (AdmissionStats, SocketCounts) {

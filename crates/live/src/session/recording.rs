@@ -85,7 +85,7 @@ impl Recording {
         let (mut written, pictures) = recorder.finish_with_pictures(summary)?;
         written.push(files.inputs.finish()?);
         written.push(sent.finish()?);
-        written.push(write_lateness(&self.folder, ticks, releases)?);
+        written.push(write_lateness(&self.folder, &[("tick", ticks), ("release", releases)])?);
         Ok((written, pictures))
     }
 

@@ -13,7 +13,7 @@ type Numbers = [[f64; 3]; 2];
 
 /// Owned copy of a [`TickRow`].
 #[derive(Debug)]
-pub(super) struct TickCopy {
+pub(crate) struct TickCopy {
     at: Instant,
     peer: usize,
     device: Numbers,
@@ -34,7 +34,7 @@ struct TurnCopy {
 }
 
 impl TickCopy {
-    pub(super) fn of(row: &TickRow<'_>) -> Self {
+    pub(crate) fn of(row: &TickRow<'_>) -> Self {
         Self {
             at: row.at,
             peer: row.peer,
@@ -51,7 +51,7 @@ impl TickCopy {
     }
 
     /// Returns the row as the recorders take it. `axes`: number of axes of the scene, at most 3.
-    pub(super) fn borrowed(&self, axes: usize) -> TickRow<'_> {
+    pub(crate) fn borrowed(&self, axes: usize) -> TickRow<'_> {
         TickRow {
             at: self.at,
             peer: self.peer,

@@ -13,7 +13,7 @@ use cohaptic_realtime::udp::EndpointCounts;
 use cohaptic_realtime::{LatenessSummary, Prepared, Validity};
 use cohaptic_wan::LinkStats;
 
-use crate::AdmissionStats;
+use crate::{AdmissionStats, Label, OtherScene};
 
 /// Snapshot of a running session, for display.
 #[derive(Clone, Debug)]
@@ -32,6 +32,8 @@ pub struct Status {
     pub links: Vec<LinkStatus>,
     /// Counts of the admission. `None` in a scene without peers in other programs.
     pub admission: Option<AdmissionStats>,
+    /// Latest peer that asked with another scene. `None` if no peer did.
+    pub other_scene: Option<OtherScene>,
     /// Measures of the scene so far. Empty if the scene asks for no measures.
     pub measures: Vec<MeasuredValue>,
 }
@@ -45,6 +47,21 @@ pub struct PeerStatus {
     pub force: [f64; 3],
     /// Counts of the samples and readings received from the peer. `None` for a simulated peer.
     pub seat: Option<SeatStats>,
+    /// Connection to the program of the peer. `None` if no program ever joined, and for a peer in this program.
+    pub connection: Option<Connection>,
+}
+
+/// Connection between the session and a peer in another program.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Connection {
+    /// Address of the program.
+    pub address: SocketAddr,
+    /// Label of the device, as the program told.
+    pub label: Label,
+    /// Samples that never came: numbers missing between the first and the highest number of each joining.
+    pub lost: u64,
+    /// Samples that the program has sent, as far as their numbers tell.
+    pub sent: u64,
 }
 
 /// Snapshot of one directed link.
@@ -87,6 +104,10 @@ pub struct Report {
     pub gates: Vec<Option<GateStats>>,
     /// Counts of the admission and of its socket. `None` in a scene without peers in other programs.
     pub admission: Option<(AdmissionStats, SocketCounts)>,
+    /// Latest peer that asked with another scene. `None` if no peer did.
+    pub other_scene: Option<OtherScene>,
+    /// Connections to the programs of peers, indexed by peer. `None` as in [`PeerStatus::connection`].
+    pub connections: Vec<Option<Connection>>,
     /// Wishes that the system granted and refused.
     pub prepared: Prepared,
     /// Paths of the files of the record. Empty if nothing was recorded.

@@ -1,7 +1,7 @@
 //! Sessions with a key: hello, welcome, and samples sealed under the keys of their joining.
 
 use cohaptic_live::client::OpenError;
-use cohaptic_live::{Admission, AdmissionControl, MAX_DATAGRAM, Place, Refusal, SessionKey};
+use cohaptic_live::{Admission, AdmissionConfig, AdmissionControl, Label, MAX_DATAGRAM, OtherScene, Place, Refusal, SessionKey};
 use cohaptic_peer::wire;
 
 use crate::support::{Counting, SEAT, SESSION, address, admitted, assert_counts, at, config, joining, keyed_door, sample, sealed, shake_hands};
@@ -181,4 +181,57 @@ fn secrets_are_not_printed() {
     // The key is 32 times the byte 0xa5, which is 165.
     assert!(!printed.contains("165, 165") && !printed.to_lowercase().contains("a5a5"), "{printed}");
     assert!(printed.contains("SessionKey(secret)") && printed.contains("WayKey(secret)"));
+}
+
+#[test]
+fn a_peer_of_another_scene_is_counted_and_not_answered() {
+    let scene = 0x8594_4171_f739_67e8;
+    let mut door =
+        AdmissionControl::new(AdmissionConfig { scene, ..config().with_key(Some(crate::support::key())) }, &mut Counting::default()).unwrap();
+    let asks = |scene: u64| joining(1).introduced(scene, Label::NONE).hello();
+    assert_eq!(door.handle_datagram(at(0), address(1), &asks(7)), Admission::Refused(Refusal::OtherScene));
+    assert_eq!(door.other_scene(), Some(OtherScene { place: SEAT, from: address(1), theirs: 7, ours: scene }));
+    assert_eq!((door.stats().refused(Refusal::OtherScene), door.stats().welcomed), (1, 0));
+    // A hello of the same scene is answered, and so is one that tells none.
+    for told in [scene, 0] {
+        assert!(matches!(door.handle_datagram(at(0), address(1), &asks(told)), Admission::Reply { .. }), "{told:x}");
+    }
+    // Without the key nobody makes the session show a fingerprint.
+    let mut forged = asks(9);
+    forged[87] ^= 1;
+    assert_eq!(door.handle_datagram(at(0), address(1), &forged), Admission::Refused(Refusal::Forged));
+    assert_eq!(door.other_scene().unwrap().theirs, 7);
+    // A session that does not know its scene answers everybody.
+    assert!(matches!(keyed_door().handle_datagram(at(0), address(1), &asks(7)), Admission::Reply { .. }));
+}
+
+#[test]
+fn the_label_of_the_hello_is_that_of_the_peer_that_joins_and_lost_samples_are_counted() {
+    let mut door = keyed_door();
+    let introduced = |nonce: u8, label: &str| joining(nonce).introduced(0, Label::new(label).unwrap());
+    let first = shake_hands(&mut door, at(0), address(1), &introduced(1, "falcon"));
+    assert_eq!(door.seat(at(0), SEAT).unwrap().label, Label::NONE, "a hello alone is nobody");
+    for number in [5, 6, 9, 8] {
+        admitted(door.handle_datagram(at(0), address(1), &sealed(&first, &sample(1, number))));
+    }
+    let status = door.seat(at(0), SEAT).unwrap();
+    assert_eq!((status.label.text(), status.admitted, status.lost), (Some("falcon"), 4, 1), "number 7 is missing");
+    // The hello of a program at another address does not rename a peer that is there.
+    shake_hands(&mut door, at(0), address(2), &introduced(2, "chai3d"));
+    assert_eq!(door.seat(at(0), SEAT).unwrap().label.text(), Some("falcon"));
+    // A new joining counts from its own first number.
+    let again = shake_hands(&mut door, at(0), address(1), &introduced(3, "inverse3"));
+    for number in [0, 3] {
+        admitted(door.handle_datagram(at(0), address(1), &sealed(&again, &sample(1, number))));
+    }
+    let status = door.seat(at(0), SEAT).unwrap();
+    assert_eq!((status.label.text(), status.admitted, status.lost), (Some("inverse3"), 6, 3));
+}
+
+#[test]
+fn a_label_of_other_bytes_than_printable_ones_is_refused() {
+    let mut door = keyed_door();
+    let mut hello = joining(1).introduced(0, Label::new("falcon").unwrap()).hello();
+    hello[50] = 0x1b;
+    assert_eq!(door.handle_datagram(at(0), address(1), &hello), Admission::Refused(Refusal::Reserved));
 }

@@ -11,6 +11,7 @@ mod examples;
 mod falcons;
 mod floods;
 mod hostile;
+mod join;
 mod key_files;
 mod keyed;
 mod keyless;

@@ -46,7 +46,7 @@ const KEYS: [Key; 19] = [
     optional("angular-velocity", vector(RATE), "As the key of [object], for this peer"),
     usual("kind", KIND, "\"simulated\"", "Place of the peer in a live session"),
     optional("silence", Form::Table(&SILENCE), "Fading of the pull of a silent peer in another program"),
-    optional("falcon", Form::Table(&FALCON), "Device of a peer of kind falcon, and the meaning of its numbers"),
+    optional("falcon", Form::Table(&FALCON), "Falcon of a peer of kind falcon, or of kind udp for cohaptic join, and the meaning of its numbers"),
     optional("pointer", Form::Table(&POINTER), "Arm through which a pointer pulls the device of a peer of kind pointer"),
 ];
 

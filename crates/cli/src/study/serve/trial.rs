@@ -33,9 +33,9 @@ pub(super) fn run(real_time: &RealTimeArguments, lab: &Arc<Lab>, board: &Arc<Boa
     let file = staged.join("scene.toml");
     write_whole(&file, |file| file.write_all(text.as_bytes())).map_err(|error| Failure::File { verb: "write", path: file, error })?;
     let config = SessionConfig {
-        pacing: real_time.pacing(),
-        wishes: real_time.wishes(),
-        tolerance: real_time.tolerance(),
+        pacing: real_time.pace.pacing(),
+        wishes: real_time.pace.wishes(),
+        tolerance: real_time.pace.tolerance(),
         out: Some(staged.to_path_buf()),
         recorded: Recorded::Inputs,
         content: scene_content_of_text(text, &lab.study.scene_file, &[])?,

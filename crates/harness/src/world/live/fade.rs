@@ -48,9 +48,9 @@ impl Ramp {
     }
 }
 
-/// Strength of one peer at another peer over time.
+/// Strength of one peer at another peer over time, by the rule of silence of a session. Instants must not go back.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Fade {
+pub struct Fade {
     /// Weight of the peer's pull.
     weight: Ramp,
     /// Share of the way from the state held before a return to the present state.
@@ -58,8 +58,9 @@ pub(crate) struct Fade {
 }
 
 impl Fade {
-    /// Returns the fade of a never heard peer.
-    pub(crate) const fn unheard(over: Duration) -> Self {
+    /// Returns the fade of a never heard peer. `over`: time from no strength to the whole strength, and back; above zero.
+    #[must_use]
+    pub const fn unheard(over: Duration) -> Self {
         Self { weight: Ramp::down(over), share: Ramp::up(over) }
     }
 
@@ -68,16 +69,18 @@ impl Fade {
         Self { weight: Ramp::up(over), share: Ramp::up(over) }
     }
 
-    pub(crate) fn fall(&mut self, at: Instant) {
+    /// Notes that the peer has been silent since `at`: its strength falls to zero from there.
+    pub fn fall(&mut self, at: Instant) {
         self.weight.turn(at, false);
     }
 
-    pub(crate) fn rise(&mut self, at: Instant) {
+    /// Notes that the peer is heard again from `at` on: its strength rises.
+    pub fn rise(&mut self, at: Instant) {
         self.weight.turn(at, true);
     }
 
     /// Notes a jump of the held sample. The way to the new state begins at `at`, unless the weight is 0: then nobody feels a jump.
-    pub(crate) fn moved(&mut self, at: Instant) {
+    pub fn moved(&mut self, at: Instant) {
         if self.weight.value(at) > 0.0 {
             self.share.restart(at);
         } else {
@@ -85,7 +88,9 @@ impl Fade {
         }
     }
 
-    pub(crate) fn age(&self, now: Instant) -> Age {
+    /// Returns the age of the peer at an instant.
+    #[must_use]
+    pub fn age(&self, now: Instant) -> Age {
         Age { weight: self.weight.value(now), share: self.share.value(now) }
     }
 }

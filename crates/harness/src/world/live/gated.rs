@@ -34,7 +34,7 @@ impl GateStats {
 }
 
 /// Device and its gate. The device is stopped when the session ends, and when this value is dropped, also by a panic.
-pub(crate) struct GatedDevice {
+pub struct GatedDevice {
     device: Box<dyn Device>,
     gate: Gate,
     stats: GateStats,
@@ -48,7 +48,9 @@ pub(crate) struct GatedDevice {
 
 impl GatedDevice {
     /// Returns a device that is read every `tick`.
-    pub(crate) fn new(device: Box<dyn Device>, tick: Duration) -> Self {
+    #[must_use]
+    #[expect(clippy::missing_panics_doc, reason = "the default limits are within their ranges")]
+    pub fn new(device: Box<dyn Device>, tick: Duration) -> Self {
         // A scene may tick more slowly than the pause that stops the force of a fast loop. The bound of a second is the greatest that a gate takes.
         let gap = tick.saturating_mul(2).clamp(Limits::DEFAULT.gap, Duration::from_secs(1));
         let limits = |force| Limits { force, gap, ..Limits::DEFAULT };
@@ -60,7 +62,7 @@ impl GatedDevice {
 
     /// Reads the device at the tick at `now`. `clock`: the time on the clock of the session, not before `now`. `sound` returns the usable part of a reading, or
     /// `None` for a reading that is not usable, which counts as none.
-    pub(crate) fn read<T>(&mut self, now: Instant, clock: Instant, sound: impl FnOnce(Reading) -> Option<T>) -> Option<T> {
+    pub fn read<T>(&mut self, now: Instant, clock: Instant, sound: impl FnOnce(Reading) -> Option<T>) -> Option<T> {
         let read = self.device.read(now).and_then(sound);
         (self.clock, self.is_read) = (clock, read.is_some());
         if self.is_read {
@@ -70,7 +72,7 @@ impl GatedDevice {
     }
 
     /// Applies a force \[N\] on the hand until the next tick, as far as the gate admits the force. A device without a reading at this tick gives no force.
-    pub(crate) fn hold(&mut self, now: Instant, span: Duration, wanted: [f64; 3]) {
+    pub fn hold(&mut self, now: Instant, span: Duration, wanted: [f64; 3]) {
         let Self { clock, is_read, reading_at, .. } = *self;
         // The device returns no reading if the user has not switched forces on, so a read device is armed.
         let moment = Moment { now: clock, ready: is_read, armed: is_read, reading_at, setpoint_at: Some(clock) };
@@ -80,15 +82,23 @@ impl GatedDevice {
     }
 
     /// Ends the force of the session for good.
-    pub(crate) fn stop(&mut self, now: Instant) {
+    pub fn stop(&mut self, now: Instant) {
         // Zero force first: a device without a thread has nobody else to send it.
         self.device.hold(now, Duration::ZERO, GatedForce::ZERO);
         self.gate.stop();
         self.device.stop();
     }
 
-    pub(crate) const fn stats(&self) -> &GateStats {
+    /// Returns the counts of the gate.
+    #[must_use]
+    pub const fn stats(&self) -> &GateStats {
         &self.stats
+    }
+}
+
+impl core::fmt::Debug for GatedDevice {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("GatedDevice").field("gate", &self.gate).field("stats", &self.stats).finish_non_exhaustive()
     }
 }
 

@@ -22,11 +22,11 @@ use crate::rows::{Input, InputRow};
 use crate::schedule::Schedule;
 
 use device::{HandDevice, UnsimulatedDevice};
-use gated::GatedDevice;
 use pulled::PulledDevice;
 use seat::Seat;
 
-pub use gated::GateStats;
+pub use fade::Fade;
+pub use gated::{GateStats, GatedDevice};
 pub(crate) use presence::RemotePeers;
 pub use presence::{Datagram, Transmit};
 pub use seat::{Presence, SampleError, SeatStats};

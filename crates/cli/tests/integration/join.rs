@@ -1,0 +1,252 @@
+//! `cohaptic join` beside `cohaptic live`: the other computer of a laboratory, over the loopback interface and between network namespaces.
+#![expect(clippy::print_stdout, reason = "a test that is skipped says why")]
+
+use std::io::{BufRead as _, BufReader};
+use std::net::SocketAddr;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::integration::desk::{Desk, parse};
+use crate::integration::router::is_inside;
+use crate::integration::running::{Client, PATIENCE, Running, TOKEN};
+
+/// Scene of a laboratory: `left` is at another computer, with a Falcon or a simulated device, and `right` is simulated by the session.
+const LAB: &str = r#"
+[scene]
+title = "Two computers"
+duration = "1h"
+seed = 7
+
+[object]
+mass = 0.45
+
+[coordination]
+strategy = "average-position"
+stiffness = 300.0
+damping = 5.0
+update = "8ms"
+
+[peer]
+device = { mass = 0.1, damping = 5.0 }
+coupling = { stiffness = 1000.0, damping = 2.0 }
+
+[[peers]]
+name = "left"
+kind = "udp"
+falcon = { device = "simulated" }
+hand = { arm = { mass = 0.3, damping = 10.0, stiffness = 100.0 }, follows = { sine = { amplitude = 0.02, frequency = 0.25 } } }
+
+[[peers]]
+name = "right"
+
+[link]
+delay = "24ms"
+"#;
+
+/// Options with which nothing depends on the speed of this machine.
+const UNHURRIED: &str = "--no-priority --tolerance 10min";
+
+fn desk() -> Desk {
+    let desk = Desk::with("lab.toml", LAB);
+    desk.write("token", TOKEN);
+    desk.set_mode("token", 0o600);
+    desk.text("live --new-key session.key");
+    desk
+}
+
+/// Session with a key, and the address at which it listens.
+fn session(desk: &Desk, words: &str) -> (Running, SocketAddr) {
+    let line = format!("live lab.toml --listen 127.0.0.1:0 --key-file session.key --token-file token --control {UNHURRIED} {words}");
+    let running = Running::begin(desk.command(&line));
+    let said = running.said("listening on ");
+    assert!(said.contains(" for left at place 0: session 7, 1 axis, with its key, scene "), "{said}");
+    (running, said.split_once(' ').unwrap().0.parse().unwrap())
+}
+
+/// Waits until the state of the session says so, and returns the state.
+fn wait(control: &Client, what: &str, is_so: impl Fn(&Value) -> bool) -> Value {
+    let begin = Instant::now();
+    loop {
+        let state = control.json("GET", "/api/state", "");
+        if is_so(&state) {
+            return state;
+        }
+        assert!(begin.elapsed() < PATIENCE, "not {what}: {state:#}");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+fn is_present(state: &Value) -> bool {
+    state["peers"][0]["status"] == "present"
+}
+
+#[test]
+fn with_the_key_it_takes_part_and_after_a_loss_of_power_it_joins_again() {
+    let desk = desk();
+    let (session, address) = session(&desk, "--json");
+    let control = Client::of(&session);
+    let join = |words: &str| {
+        Running::begin(desk.command(&format!("join {address} lab.toml --peer left --device simulated --key-file session.key {UNHURRIED} {words}")))
+    };
+    let first = join("");
+    assert_eq!(first.said("the session at "), format!("{address} takes part with left"));
+    let state = wait(&control, "present", is_present);
+    let joined = &state["peers"][0]["joined"];
+    assert_eq!(
+        (joined["device"].as_str(), joined["address"].as_str(), joined["lost"].as_u64()),
+        (Some("sim"), Some("127.0.0.1"), Some(0)),
+        "{state:#}"
+    );
+    // A killed program says nothing: the session notices the silence, and the others fade.
+    first.kill();
+    wait(&control, "stale", |state| state["peers"][0]["status"] == "stale");
+    let second = join("--out left");
+    wait(&control, "present again", is_present);
+    wait(&control, "in motion", |state| state["peers"][1]["position"][0].as_f64().is_some_and(|position| position.abs() > 1e-4));
+    let outcome = second.end_by("-INT");
+    assert_eq!(outcome.status, Some(130), "{}", outcome.stderr);
+    for part in [
+        &format!("Two computers: left at {address}, with the device simulated\n"),
+        "\n  the run is valid\n",
+        " sent in 1 joining\n",
+        "\n  right: ",
+        "drift not known before 20s",
+        "\n  left ends at ",
+    ] {
+        assert!(outcome.stdout.contains(part), "no {part:?} in {}", outcome.stdout);
+    }
+    let trajectory = desk.read("left/trajectory.csv");
+    let mut rows = trajectory.lines();
+    assert_eq!(rows.next(), Some("t,peer,xh,vh,xo,vo,xd,vd,fc,ft"));
+    // Tick 0 is the welcome, and every tick is a row of this peer alone.
+    for (tick, row) in rows.enumerate() {
+        let (t, rest) = row.split_once(',').unwrap();
+        assert!((t.parse::<f64>().unwrap() - tick as f64 * 1e-3).abs() < 1e-12 && rest.starts_with("left,"), "{row}");
+    }
+    assert!(desk.read("left/lateness.csv").contains("\ntick,"));
+    let document = parse(&session.end_by("-INT").stdout);
+    let seat = &document["peers"][0]["seat"];
+    assert_eq!((seat["joined"].as_u64(), document["door"]["joinings"].as_u64()), (Some(2), Some(2)), "{document:#}");
+}
+
+#[test]
+fn a_wrong_key_scene_place_or_kind_is_a_sentence() {
+    let desk = desk();
+    let (session, address) = session(&desk, "");
+    desk.text("live --new-key other.key");
+    let join = |words: &str| desk.cohaptic(&format!("join {address} lab.toml --device simulated {UNHURRIED} {words}"));
+    let left = "--peer left --key-file session.key";
+    let no_welcome =
+        &["no welcome from 127.0.0.1:", "Possible reasons: no session listens there", "another one than --key-file", "its scene is another one"];
+    let with_other_key = join("--for 2.5s --peer left --key-file other.key");
+    with_other_key.assert_refused(3, no_welcome);
+    // After two seconds the reasons are listed while it goes on asking, and once more as the error at its end.
+    assert_eq!(with_other_key.stderr.matches("Possible reasons").count(), 2, "{}", with_other_key.stderr);
+    join(&format!("{left} --for 300ms --set link.delay=25ms")).assert_refused(3, no_welcome);
+    let other = session.said("127.0.0.1:");
+    assert!(other.contains(" asked to be left with another scene: ") && other.contains(", and this session's is "), "{other}");
+    // The length of this peer's part is its own.
+    let joined = join(&format!("{left} --for 300ms"));
+    assert_eq!(joined.status, Some(0), "{}", joined.stderr);
+    // Without a key nobody hears it, and of the possible reasons the key is one.
+    join("--peer left --for 300ms").assert_refused(3, &["nothing from 127.0.0.1:", "it has a key, which --key-file must name here, too"]);
+
+    join("--peer third --key-file session.key").assert_refused(2, &["--peer third: ", "lab.toml has no such peer: expected left"]);
+    let kind = "in lab.toml its kind is \"simulated\", so the session itself computes it: expected kind = \"udp\"";
+    join("--peer right --key-file session.key").assert_refused(2, &["--peer right: ", kind]);
+    join(&format!("{left} --set coordination.strategy=extrapolated"))
+        .assert_refused(2, &["left: the coordination extrapolates samples", "one-way times"]);
+    let change = "--set 'timeline=[{at=\"1s\",coordination={stiffness=1.0}}]'";
+    join(&format!("{left} {change}")).assert_refused(2, &["the timeline changes the gains of the coordination"]);
+    let away = desk.cohaptic("join 192.0.2.7:7400 lab.toml --peer left --device simulated");
+    away.assert_refused(2, &["whoever answers at 192.0.2.7:7400 could pull at the device", "--key-file", "--allow-remote"]);
+    desk.set_mode("other.key", 0o644);
+    join("--peer left --key-file other.key").assert_refused(2, &["other.key can be opened by others", "chmod 600"]);
+
+    let report = session.end_by("-INT").stdout;
+    for part in [" other-scene", " asked to be left with another scene: ", ", of sim at 127.0.0.1"] {
+        assert!(report.contains(part), "no {part:?} in {report}");
+    }
+}
+
+/// Network of its own, as a process that does nothing in it.
+struct Network(Child);
+
+impl Network {
+    fn new() -> Self {
+        let mut command = Command::new("unshare");
+        command.args(["-n", "--", "sh", "-c", "echo ready; exec sleep 3600"]);
+        let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        assert_eq!(line, "ready\n");
+        Self(child)
+    }
+
+    fn path(&self) -> String {
+        format!("/proc/{}/ns/net", self.0.id())
+    }
+
+    /// Begins a command of the program in this network.
+    fn begin(&self, desk: &Desk, line: &str) -> Running {
+        let cohaptic = desk.command(line);
+        let mut command = Command::new("nsenter");
+        command.arg(format!("--net={}", self.path())).arg("--").arg(cohaptic.get_program()).args(cohaptic.get_args());
+        command.current_dir(cohaptic.get_current_dir().unwrap());
+        Running::begin(command)
+    }
+}
+
+impl Drop for Network {
+    fn drop(&mut self) {
+        drop(self.0.kill());
+        drop(self.0.wait());
+    }
+}
+
+#[test]
+fn two_computers_with_a_line_between_them_and_a_falcon_at_one_of_them() {
+    if !is_inside("integration::join::two_computers_with_a_line_between_them_and_a_falcon_at_one_of_them") {
+        return;
+    }
+    if !Command::new("nsenter").arg("-V").stdout(Stdio::null()).status().is_ok_and(|status| status.success()) {
+        println!("skipped: there is no nsenter");
+        return;
+    }
+    let desk = desk();
+    let (left, right) = (Network::new(), Network::new());
+    desk.write(
+        "line.toml",
+        format!(
+            "[router]\nseed = 1\ndefault = \"wan\"\n[left]\ntun = \"left0\"\naddresses = [\"10.1.0.1/24\"]\nnamespace = \"{}\"\n\
+             [right]\ntun = \"right0\"\naddresses = [\"10.1.0.2/24\"]\nnamespace = \"{}\"\n[links.wan]\ndelay = \"5ms\"\nloss = \"10%\"\n",
+            left.path(),
+            right.path()
+        ),
+    );
+    let router = Running::begin(desk.command(&format!("router line.toml {UNHURRIED}")));
+    router.said("between left ");
+    let session = right.begin(&desk, &format!("live lab.toml --listen 10.1.0.2:7400 --key-file session.key --json --out session {UNHURRIED}"));
+    session.said("listening on 10.1.0.2:7400 for left at place 0");
+    let words = "join 10.1.0.2:7400 lab.toml --peer left --device falcon --key-file session.key --for 3s";
+    let join = left.begin(&desk, &format!("{words} {UNHURRIED}"));
+    join.said("homing the simulated Falcons of left");
+    assert_eq!(join.said("the session at "), "10.1.0.2:7400 takes part with left");
+    let outcome = join.end();
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    for part in ["\n  the run is valid\n", "\n  reading and holding the device took, a tick: p50 "] {
+        assert!(outcome.stdout.contains(part), "no {part:?} in {}", outcome.stdout);
+    }
+    let outcome = session.end_by("-INT");
+    let document = parse(&outcome.stdout);
+    let seat = &document["peers"][0]["seat"];
+    // Of 375 samples in 3 s the line loses a tenth.
+    let taken = seat["taken"].as_u64().unwrap();
+    assert!((200..=375).contains(&taken) && seat["joined"].as_u64() >= Some(1), "{document:#}");
+    // The record of the session is replayed as any other.
+    desk.text("run lab.toml --inputs session/inputs.csv --out again");
+    assert_eq!(desk.read("session/trajectory.csv"), desk.read("again/trajectory.csv"));
+    drop(router);
+}

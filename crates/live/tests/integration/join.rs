@@ -1,0 +1,271 @@
+//! Joined peers in virtual time: the peer of a session at another computer moves as the peer that the session computes itself.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Duration;
+
+use cohaptic_device::{Description, Device, GatedForce, Reading, Stopper};
+use cohaptic_harness::TickRow;
+use cohaptic_harness::live::LiveScene;
+use cohaptic_live::join::{JoinedConfig, JoinedPeer, Unfit};
+use cohaptic_live::{Admission, AdmissionConfig, AdmissionControl, Label, MAX_DATAGRAM, Place, Seat, SessionKey};
+use cohaptic_peer::{State, wire};
+use cohaptic_scene::Scene;
+use cohaptic_units::Instant;
+
+use crate::support::{Counting, address, key};
+
+/// Scene of two peers of 0.225 kg with KT 500, BT 5 and a device of 0.1 kg and 5 N·s/m. The link delivers between two ticks.
+const SCENE: &str = "scene = { title = \"two\", duration = \"3s\", seed = 7 }\nobject = { mass = 0.45 }\n\
+    coordination = { strategy = \"average-position\", stiffness = 500.0, damping = 5.0, update = \"8ms\" }\n\
+    peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 }, silence = { fade = \"1ns\" } }\n\
+    peers = [{ name = \"left\", hand = { force = 1.5 } }, { name = \"right\" }]\nlink = { delay = \"24.5ms\" }\n";
+
+fn scene(overrides: &[&str]) -> Scene {
+    let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+    Scene::parse_live(SCENE, Path::new("two.toml"), &overrides).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn config(key: Option<SessionKey>) -> JoinedConfig {
+    JoinedConfig { key, scene: 7, label: Label::new("test").unwrap() }
+}
+
+fn peer(overrides: &[&str], key: Option<SessionKey>, device: Option<Box<dyn Device>>) -> JoinedPeer {
+    JoinedPeer::new(scene(overrides), 0, config(key), device).unwrap()
+}
+
+fn at(micros: u64) -> Instant {
+    Instant::from_nanos(micros * 1000)
+}
+
+/// Does what is due until `now`, and returns the datagrams sent.
+fn pass(peer: &mut JoinedPeer, now: Instant, observer: &mut impl FnMut(&TickRow<'_>)) -> Vec<Vec<u8>> {
+    let mut sent = Vec::new();
+    while peer.poll_timeout() <= now {
+        peer.handle_timeout(now.min(peer.poll_timeout().max(Instant::ZERO)), &mut Counting::default(), &mut |_, row| observer(row)).unwrap();
+        sent.extend(std::iter::from_fn(|| peer.poll_transmit()).map(|outgoing| outgoing.bytes().to_vec()));
+    }
+    sent
+}
+
+/// The numbers were computed by two other programs from the equations of the model.
+#[test]
+fn a_peer_alone_moves_as_the_equations_say() {
+    let slow = ["peer.coupling.stiffness=1000", "peer.coupling.damping=2", "peer.device.exchange-every=2", "peer.device.exchange-age=1"];
+    let cases: [(&[&str], [f64; 4]); 2] = [
+        (&[], [0.00418909868044695, -0.0126283653899512, 0.003717446243695, -0.0121602475770235]),
+        (&slow, [0.00524952463767579, -0.0111540648355197, 0.00377446409899885, -0.00545479030280096]),
+    ];
+    for (overrides, expected) in cases {
+        let mut peer = peer(overrides, None, None);
+        pass(&mut peer, at(99_000), &mut |_| ());
+        let status = peer.status(at(99_000));
+        assert_eq!(status.ticks, 100);
+        let found = [status.device.position[0], status.device.velocity[0], status.object.position[0], status.object.velocity[0]];
+        for (found, expected) in found.into_iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-12, "{found} in place of {expected}");
+        }
+    }
+}
+
+/// States and forces of a row: device, copy, target, FC and FT along the axis.
+type Row = [f64; 8];
+
+fn numbers(row: &TickRow<'_>) -> Row {
+    let state = |state: &cohaptic_harness::StateRow<'_>| [state.position[0], state.velocity[0]];
+    let ([xh, vh], [xo, vo], [xd, vd]) = (state(&row.device), state(&row.object), state(&row.target));
+    [xh, vh, xo, vo, xd, vd, row.coupling_force[0], row.coordination_force[0]]
+}
+
+/// Observer that keeps the rows of both peers.
+#[derive(Default)]
+struct Rows(BTreeMap<(usize, Instant), Row>);
+
+impl cohaptic_harness::Observer for Rows {
+    type Error = std::convert::Infallible;
+
+    fn wants_ticks(&self) -> bool {
+        true
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Self::Error> {
+        self.0.insert((row.peer, row.at), numbers(row));
+        Ok(())
+    }
+}
+
+/// Runs a session whose peer `left` joins with a key, in virtual time. Returns the rows of both peers.
+fn joined(overrides: &[&str], millis: u64) -> Rows {
+    let elsewhere: Vec<&str> = overrides.iter().copied().chain(["peers.left.kind=udp"]).collect();
+    let theirs = scene(&elsewhere);
+    let mut live = LiveScene::new(&theirs, |_| None);
+    let seats = vec![Seat { place: Place(0), name: "left".to_owned(), tick: Duration::from_millis(1) }];
+    let admission = AdmissionConfig { kind: theirs.sample_kind(), ..AdmissionConfig::new(7, 1, 2, Duration::from_millis(8), seats) };
+    let mut door = AdmissionControl::new(admission.with_key(Some(key())), &mut Counting::default()).unwrap();
+    let mut left = peer(overrides, Some(key()), None);
+    let (mut rows, mut own) = (Rows::default(), BTreeMap::new());
+    for half in 0..=2 * millis {
+        let now = at(500 * half);
+        // Twice: the welcome makes tick 0 due at once.
+        for _ in 0..2 {
+            for datagram in pass(&mut left, now, &mut |row| {
+                own.insert((row.peer, row.at), numbers(row));
+            }) {
+                match door.handle_datagram(now, address(1), &datagram) {
+                    Admission::Sample { sample, .. } => drop(live.handle_sample(now, 0, sample.bytes(), &mut rows).unwrap().unwrap()),
+                    Admission::Reply { bytes, .. } => left.handle_datagram(now, &bytes),
+                    Admission::Refused(cause) => panic!("{cause}"),
+                }
+            }
+        }
+        while live.poll_timeout().is_some_and(|due| due <= now) {
+            live.handle_timeout(now, &mut rows).unwrap();
+        }
+        let mut sealed = [0; MAX_DATAGRAM];
+        while let Some(transmit) = live.poll_transmit() {
+            let (_, len) = door.seal(now, Place(0), &transmit.datagram, &mut sealed).unwrap();
+            left.handle_datagram(transmit.at, &sealed[..len]);
+        }
+    }
+    rows.0.extend(own);
+    rows
+}
+
+#[test]
+fn a_joined_peer_moves_as_the_peer_of_the_session_over_the_same_link() {
+    let slow = ["peers.left.device.exchange-every=2", "peers.left.device.exchange-age=1", "peer.coupling.stiffness=1000"];
+    for overrides in [&[][..], &slow, &["link.loss=20%"], &["coordination.strategy=wave", "coordination.stiffness=0"]] {
+        let mut expected = Rows::default();
+        let reference = scene(overrides);
+        let mut live = LiveScene::new(&reference, |_| None);
+        live.handle_timeout(at(1_999_500), &mut expected).unwrap();
+        let found = joined(overrides, 2000);
+        assert!(expected.0.len() == 4000, "{}", expected.0.len());
+        for (key, expected) in &expected.0 {
+            let found = found.0.get(key).unwrap_or_else(|| panic!("no {key:?}"));
+            for (found, expected) in found.iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-12, "{overrides:?} {key:?}: {found} in place of {expected}");
+            }
+        }
+    }
+}
+
+/// Device at a fixed position that can be there or not.
+struct There(std::sync::Arc<std::sync::Mutex<(bool, f64)>>);
+
+impl Device for There {
+    fn description(&self) -> Description {
+        Description { name: "there".to_owned(), motions: 3, force: 20.0, period: Duration::from_millis(1) }
+    }
+
+    fn stopper(&self) -> Stopper {
+        Stopper::default()
+    }
+
+    fn read(&mut self, _now: Instant) -> Option<Reading> {
+        self.0.lock().unwrap().0.then_some(Reading { position: [0.01, 0.0, 0.0], velocity: [0.0; 3] })
+    }
+
+    fn hold(&mut self, _now: Instant, _span: Duration, force: GatedForce) {
+        self.0.lock().unwrap().1 = force.newtons()[0];
+    }
+}
+
+#[test]
+fn a_silent_session_and_a_device_that_is_not_there_end_the_force_at_once() {
+    let shared = std::sync::Arc::new(std::sync::Mutex::new((true, 0.0)));
+    let quick = ["peers.left.kind=falcon", "peers.left.silence.fade=100ms"];
+    let mut peer = peer(&quick, None, Some(Box::new(There(shared.clone()))));
+    let mut seconds = |until: u64, there: bool| {
+        shared.lock().unwrap().0 = there;
+        let sent = pass(&mut peer, at(until * 1000), &mut |_| ()).len();
+        (sent, shared.lock().unwrap().1)
+    };
+    // The force rises from zero over the fade: at tick 0 there is none, and in the middle there is half of KC times the distance.
+    assert!(seconds(0, true).1.abs() < 1e-12);
+    let (sent, force) = seconds(500, true);
+    assert!(sent > 60 && force.abs() > 0.1, "{sent} {force}");
+    assert_eq!(seconds(501, false).1, 0.0, "a device that cannot be read");
+    assert_eq!(seconds(600, false).0, 0, "nobody hears of a device that is not there");
+    assert!(seconds(999, true).1.abs() > 0.1);
+    // Nothing new has come for a second since tick 0.
+    assert_eq!(seconds(1000, true).1, 0.0);
+    let (sent, force) = seconds(2000, true);
+    assert_eq!((sent, force), (125, 0.0), "it goes on sending, so that the session finds it again");
+    let sample = wire::Sample { session: 7, sender: 1, sequence: 0, sent: Instant::ZERO, state: State { position: [0.0], velocity: [0.0] } };
+    let mut datagram = [0; wire::MAX_LEN];
+    let len = sample.encode(1, &mut datagram);
+    peer.handle_datagram(at(2_000_500), &datagram[..len]);
+    let status = |peer: &JoinedPeer, millis: u64| peer.status(at(millis * 1000)).is_session_there;
+    assert!(!status(&peer, 2000));
+    pass(&mut peer, at(2_050_000), &mut |_| ());
+    assert!(status(&peer, 2050) && shared.lock().unwrap().1.abs() > 1e-3, "the session is back, and the force rises");
+    assert_eq!(peer.status(at(2_050_000)).silences, 1);
+}
+
+/// The other peer is elsewhere, too: before its first sample and after its silence it has no pull, and its pull rises and falls over its fade.
+#[test]
+fn the_pull_of_another_peer_elsewhere_fades_as_in_a_session() {
+    let mut left = peer(&["peers.right.kind=udp", "peers.right.silence.fade=100ms"], None, None);
+    // The mean of the other peers is own + w·(0.01 m − own).
+    let weight = |left: &mut JoinedPeer, millis: u64| {
+        let mut weight = f64::NAN;
+        pass(left, at(millis * 1000), &mut |row| {
+            let own = row.object.position[0];
+            weight = (row.target.position[0] - own) / (0.01 - own);
+        });
+        weight
+    };
+    let sample = |sequence: u64| {
+        let state = State { position: [0.01], velocity: [0.0] };
+        let mut datagram = [0; wire::MAX_LEN];
+        let len = wire::Sample { session: 7, sender: 1, sequence, sent: Instant::ZERO, state }.encode(1, &mut datagram);
+        datagram[..len].to_vec()
+    };
+    let expect = |left: &mut JoinedPeer, millis: u64, expected: f64| {
+        let found = weight(left, millis);
+        assert!((found - expected).abs() < 1e-9, "{found} in place of {expected} at {millis} ms");
+    };
+    expect(&mut left, 100, 0.0);
+    left.handle_datagram(at(100_500), &sample(0));
+    expect(&mut left, 101, 0.0);
+    expect(&mut left, 126, 0.25);
+    for number in 1..100 {
+        left.handle_datagram(at(126_000 + 8000 * number), &sample(number));
+    }
+    expect(&mut left, 930, 1.0);
+    // The last sample came at 918 ms.
+    expect(&mut left, 1918, 1.0);
+    expect(&mut left, 1968, 0.5);
+    expect(&mut left, 2030, 0.0);
+}
+
+#[test]
+fn a_welcome_that_does_not_fit_names_what_differs() {
+    let seats = vec![Seat { place: Place(0), name: "left".to_owned(), tick: Duration::from_millis(2) }];
+    let other = AdmissionConfig::new(7, 3, 4, Duration::from_millis(10), seats).with_key(Some(key()));
+    let mut door = AdmissionControl::new(other, &mut Counting::default()).unwrap();
+    let mut left = peer(&[], Some(key()), None);
+    for hello in pass(&mut left, at(0), &mut |_| ()) {
+        let Admission::Reply { bytes, .. } = door.handle_datagram(at(0), address(1), &hello) else { panic!("no welcome") };
+        left.handle_datagram(at(0), &bytes);
+    }
+    assert_eq!(
+        left.mismatch().unwrap().to_string(),
+        "the session is another one: it has 4 peers, this scene 2; it has 3 axes, this scene 1; its tick for this peer is 2ms, here 1ms; \
+         its coordination.update is 10ms, here 8ms"
+    );
+}
+
+#[test]
+fn scenes_that_need_one_clock_or_one_place_are_refused_by_name() {
+    let refuse = |overrides: &[&str]| JoinedPeer::new(scene(overrides), 0, config(None), None).unwrap_err();
+    assert_eq!(refuse(&["coordination.strategy=extrapolated"]), Unfit::Extrapolated);
+    let timeline = |change: &str| format!("timeline=[{{ at = \"1s\", {change} }}]");
+    assert!(matches!(refuse(&[&timeline("coordination = { stiffness = 100.0 }")]), Unfit::Timeline(_)));
+    assert!(matches!(refuse(&[&timeline("peer = \"left\", set = { hand = { force = 1.0 } }")]), Unfit::Timeline(_)));
+    // Another peer's hand and links are the session's.
+    for change in ["peer = \"right\", set = { hand = { force = 1.0 } }", "link = \"all\", set = { loss = 0.5 }"] {
+        JoinedPeer::new(scene(&[&timeline(change)]), 0, config(None), None).unwrap();
+    }
+}
