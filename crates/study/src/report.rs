@@ -63,7 +63,7 @@ impl StudyFolder {
             "{} of {} with {} each are complete. {valid} of {} are valid, practice included.{more}",
             complete,
             Counted(study.groups, "session"),
-            Counted(size, "person").to_string().replace("persons", "people"),
+            Counted(size, "person"),
             Counted(trials.len(), "trial"),
         )
     }

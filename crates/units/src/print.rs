@@ -57,7 +57,8 @@ impl fmt::Display for Span {
     }
 }
 
-/// Prints a number and a noun, which is given in the singular and takes the plural where needed: `1 change`, `2 changes`, `0 entries`, `3 axes`.
+/// Prints a number and a noun, which is given in the singular and takes the plural where needed: `1 change`, `2 changes`, `0 entries`, `3 axes`,
+/// `2 people`.
 #[derive(Clone, Copy, Debug)]
 pub struct Counted<'a, N>(pub N, pub &'a str);
 
@@ -66,6 +67,9 @@ impl<N: Copy + fmt::Display + PartialEq + From<u8>> fmt::Display for Counted<'_,
         let Self(number, one) = *self;
         if number == N::from(1) {
             return write!(f, "{number} {one}");
+        }
+        if one == "person" {
+            return write!(f, "{number} people");
         }
         match (one.strip_suffix('y'), one.strip_suffix("is")) {
             // After a vowel the y stays: delays, keys.
@@ -152,6 +156,7 @@ mod tests {
         let print = |number: usize, one| format!("{}", Counted(number, one));
         assert_eq!([print(1, "change"), print(2, "change"), print(0, "entry"), print(3, "axis")], ["1 change", "2 changes", "0 entries", "3 axes"]);
         assert_eq!([print(1, "axis"), print(2, "delay"), print(1, "copy")], ["1 axis", "2 delays", "1 copy"]);
+        assert_eq!([print(1, "person"), print(3, "person")], ["1 person", "3 people"]);
     }
 
     #[test]
