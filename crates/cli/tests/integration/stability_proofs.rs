@@ -35,6 +35,8 @@ fn spans_of_numbers_change_where_single_verdicts_do() {
     let text = desk.text("stability point equal.toml --every-number");
     let note = "note: as N grows, the gains of the coordination grow with N: beyond N = 100000 only instability can be proven\n";
     assert!(text.contains(note) && text.contains("unstable  for N >= 180\n"), "{text}");
+    let text = desk.text("stability point equal.toml --every-number 200000..");
+    assert!(text.contains("beyond N = 200000 only instability can be proven\n") && text.contains("unstable  for N >= 200000\n"), "{text}");
     let text = desk.text("stability point equal.toml --every-number 2..9 --set link.loss=5%");
     assert!(text.contains("equal to peer1, proven in the mean square:\n    stable    for 2 <= N <= 9\n"), "{text}");
 }
@@ -55,6 +57,7 @@ fn undecided_numbers_have_a_reason_and_uncertified_ones_a_note() {
     assert!(on_circle.starts_with("at N = 2 the largest eigenvalue of a frame, of the size 1"), "{on_circle}");
     assert!(on_circle.contains(", is too near to the unit circle for bounds of "), "{on_circle}");
     assert_eq!(reason(&format!("{shipped}/coordination/n50.toml --every-number"), "N >= 100001"), "no proof was found beyond N = 100000");
+    assert_eq!(reason(&format!("{shipped}/coordination/n50.toml --every-number 200000.."), "N >= 200001"), "no proof was found beyond N = 200000");
     let limit = reason(&format!("{shipped}/coordination/wave.toml --every-number"), "N >= 131071");
     assert!(limit.starts_with("as N grows, the largest eigenvalue of a frame, of the size 1"), "{limit}");
     let lossy = "equal.toml --set object.mass=1 --set coordination.stiffness=5000 --set link.loss=20% --every-number 30..38";

@@ -102,7 +102,8 @@ fn reason(from: u64, why: Openness) -> String {
     match why {
         Openness::Ended => "the proof was stopped".to_owned(),
         Openness::Exhausted => "too many pieces were looked at".to_owned(),
-        Openness::Beyond => format!("no proof was found beyond N = {MOST_FOLLOWED}"),
+        // The span begins after the followed numbers, or after the first number of the range if that is larger.
+        Openness::Beyond => format!("no proof was found beyond N = {}", from - 1),
         Openness::Moment => format!("no second moment was found that decides N = {from}"),
         Openness::Near(near) => format!("at N = {from} {}", too_near(near)),
         Openness::Limit(near) => format!("as N grows, {}", too_near(near)),
@@ -144,7 +145,9 @@ pub(super) fn words(scene: &Scene, Proof { every, certificate }: &Proof) -> Stri
     }
     if let Some(what) = &every.without_limit {
         let beyond = if every.is_mean_square { "nothing can be proven" } else { "only instability can be proven" };
-        let _ = writeln!(text, "  note: as N grows, {what}: beyond N = {MOST_FOLLOWED} {beyond}");
+        // A range that begins above the followed numbers is followed at its first number only.
+        let followed = every.spans.first().map_or(MOST_FOLLOWED, |first| first.from.max(MOST_FOLLOWED));
+        let _ = writeln!(text, "  note: as N grows, {what}: beyond N = {followed} {beyond}");
     }
     let uncertified = certificate.iter().flat_map(|certificate| &certificate.uncertified);
     let uncertified: Vec<String> = uncertified.map(|(from, to)| numbers(*from, *to)).collect();
