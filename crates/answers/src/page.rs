@@ -75,6 +75,14 @@ impl AnswerPage {
     }
 }
 
+impl Origin<'_> {
+    /// Returns whether the command of this origin has made a page, from the same text of the scene. Names of files and overrides are part of the command.
+    #[must_use]
+    pub fn has_made(&self, page: &str) -> bool {
+        [made_by(self.command), scene_text(self.scene)].iter().all(|part| page.contains(part.as_str()))
+    }
+}
+
 /// Returns the section of a page with the command for making the page again.
 #[must_use]
 pub fn made_by(command: &str) -> Html {

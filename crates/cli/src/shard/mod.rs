@@ -19,7 +19,7 @@ use crate::failure::Failure;
 use crate::file::own_folder;
 use crate::output::{self, NO_FILES};
 
-pub(crate) use status::{all_done, logs_in, missing, show};
+pub(crate) use status::{all_done, has_result, logs_in, missing, show};
 use worker::nobody_works_in;
 pub(crate) use worker::{Worker, owner};
 

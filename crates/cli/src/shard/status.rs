@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use cohaptic_answers::page::Origin;
 use cohaptic_answers::shards::{Status, Worker, status_document, status_words};
 use cohaptic_campaign::{Missing, Shard, is_log};
 use cohaptic_files::Holder;
@@ -61,9 +62,16 @@ pub(crate) fn all_done(folder: &Path, names: Names, pieces: &[Piece]) -> Result<
     if undone.is_empty() { Ok(()) } else { Err(missing(folder, &Missing { piece: names.piece, count: pieces.len() as u64, pieces: undone })) }
 }
 
-/// Prints the done pieces of a folder, and the workers. `is_merged`: the folder has the merged result.
+/// Returns whether a folder has the merged result of work whose rows are removed at the end: the page `name` with this origin, and no rows or workers.
+pub(crate) fn has_result(folder: &Path, pieces: &[Piece], name: &str, origin: &Origin<'_>) -> bool {
+    let is_at_work = pieces.iter().any(|piece| piece.is_done) || !logs_in(folder).is_empty();
+    !is_at_work && fs::read_to_string(folder.join(name)).is_ok_and(|page| origin.has_made(&page))
+}
+
+/// Prints the done pieces of a folder, and the workers. `is_merged`: the folder has the merged result, so that every piece is done.
 pub(crate) fn show(json: bool, folder: &Path, names: Names, pieces: &[Piece], is_merged: bool) -> Result<ExitCode, Failure> {
-    let status = Status { folder: output::path(folder), names, pieces, workers: workers(folder)?, is_merged };
+    let pieces: Vec<Piece> = pieces.iter().map(|piece| Piece { is_done: piece.is_done || is_merged, ..*piece }).collect();
+    let status = Status { folder: output::path(folder), names, pieces: &pieces, workers: workers(folder)?, is_merged };
     output::answer(json, DocumentSchema::STATUS, &status_document(&status), || status_words(&status), NO_FILES)?;
     Ok(ExitCode::SUCCESS)
 }

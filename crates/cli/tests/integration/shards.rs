@@ -118,10 +118,14 @@ fn while_anything_is_missing_a_merge_says_what_and_by_which_shard_it_is_done() {
         assert_eq!((&document["workers"][0]["shard"], &document["workers"][0]["state"]), (&"2/4".into(), &"done".into()));
         // One process may do the rest, and tidies up.
         desk.text(&format!("{line} --out {out}"));
-        if piece == "part" {
-            // A merge of a merged campaign would do nothing, so that the status does not advise it.
-            let status = desk.text(&format!("{line} --status {out}"));
-            assert!(status.ends_with("all is done and put together\n"), "{status}");
+        // A merge of merged work would do nothing, so that the status does not advise it.
+        let status = desk.text(&format!("{line} --status {out}"));
+        assert!(status.starts_with(&format!("{out}: 8 of 8 {piece}s are done, ")), "{status}");
+        assert!(status.ends_with("all is done and put together\n"), "{status}");
+        // The result of another scene is none of this one.
+        if piece != "part" {
+            let status = desk.text(&format!("{line} --set link.delay=3ms --status {out}"));
+            assert!(status.starts_with(&format!("{out}: 0 of 8 {piece}s are done, ")), "{status}");
         }
         assert!(desk.files(out).iter().all(|name| !name.contains("worker") && !name.contains("partial")), "{:?}", desk.files(out));
     }

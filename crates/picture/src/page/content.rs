@@ -208,7 +208,9 @@ impl Html {
         Self { text }
     }
 
-    pub(super) fn as_str(&self) -> &str {
+    /// Returns the part as it stands in a page.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
         &self.text
     }
 

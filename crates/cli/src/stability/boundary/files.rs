@@ -26,12 +26,7 @@ pub(super) fn write(folder: &Path, order: &Order, arguments: &BoundaryArguments,
 }
 
 /// Calls `page` with the origin of the answer.
-pub(super) fn with_origin(
-    order: &Order,
-    arguments: &BoundaryArguments,
-    pictures: &[(&str, &str)],
-    page: impl FnOnce(&Origin<'_>) -> String,
-) -> String {
+pub(super) fn with_origin<T>(order: &Order, arguments: &BoundaryArguments, pictures: &[(&str, &str)], page: impl FnOnce(&Origin<'_>) -> T) -> T {
     let (scene, overrides) = (&arguments.scene.scene, &arguments.scene.overrides.set);
     let command = CommandLine::new("stability boundary", scene, overrides)
         .option("--along", [&arguments.along])

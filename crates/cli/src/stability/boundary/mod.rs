@@ -54,7 +54,11 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
     let kept = sharing.folder().map(|folder| Kept { folder, name: ROWS, header: &order.header });
     match (sharing, kept) {
         (Sharing::Shard(shard, _), Some(kept)) => return shard::answer(arguments.scene.json, &sharing::shard(&order, arguments, shard, kept)?),
-        (Sharing::Status(folder), Some(kept)) => return show(arguments.scene.json, folder, sharing::NAMES, &sharing::pieces(&order, kept)?, false),
+        (Sharing::Status(folder), Some(kept)) => {
+            let pieces = sharing::pieces(&order, kept)?;
+            let is_merged = files::with_origin(&order, arguments, &[], |origin| shard::has_result(folder, &pieces, "boundary.html", origin));
+            return show(arguments.scene.json, folder, sharing::NAMES, &pieces, is_merged);
+        }
         (Sharing::Merge(folder), Some(kept)) => all_done(folder, sharing::NAMES, &sharing::pieces(&order, kept)?)?,
         (Sharing::Whole(_), Some(_)) | (_, None) => {}
     }

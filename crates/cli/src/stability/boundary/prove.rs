@@ -11,7 +11,7 @@ use cohaptic_stability::BoundaryError;
 use cohaptic_units::print::{Counted, SixDigits, csv_field};
 use serde::Serialize;
 
-use super::Order;
+use super::{Order, files};
 use crate::arguments::BoundaryArguments;
 use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
@@ -45,7 +45,11 @@ pub(super) fn prove(order: &Order, arguments: &BoundaryArguments, sharing: Shari
         (Sharing::Shard(shard, _), Some(proofs)) => {
             return shard::answer(arguments.scene.json, &proofs.shard(shard, |_, error| failure(order, arguments, error))?);
         }
-        (Sharing::Status(folder), Some(proofs)) => return shard::show(arguments.scene.json, folder, proof_blocks::NAMES, &proofs.pieces()?, false),
+        (Sharing::Status(folder), Some(proofs)) => {
+            let pieces = proofs.pieces()?;
+            let is_merged = files::with_origin(order, arguments, &[], |origin| shard::has_result(folder, &pieces, "proof.html", origin));
+            return shard::show(arguments.scene.json, folder, proof_blocks::NAMES, &pieces, is_merged);
+        }
         (Sharing::Merge(_) | Sharing::Whole(_), _) | (_, None) => {}
     }
     let (_own, rows) = proofs.map_or(Ok((None, Vec::new())), |proofs| proofs.rows(sharing))?;
@@ -171,7 +175,7 @@ fn page(order: &Order, arguments: &BoundaryArguments, line: &ProvenLine, uncerti
         tables: Html::heading(2, "Stretches").and(Html::table(&stretches)).and(more_rows(line.stretches.len() as u64, "stretches", "proof.csv")),
         notes: uncertified.and_then(guarantee::left_open).into_iter().collect(),
     };
-    super::files::with_origin(order, arguments, &[], |origin| page.html(origin))
+    files::with_origin(order, arguments, &[], |origin| page.html(origin))
 }
 
 /// Returns the CSV table of the stretches, one row per stretch.

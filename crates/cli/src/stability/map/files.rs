@@ -14,6 +14,7 @@ use crate::arguments::MapArguments;
 use crate::failure::Failure;
 use crate::file::write_into;
 use crate::output::figure;
+use crate::shard::Piece;
 use crate::shell::CommandLine;
 use crate::stability::guarantee::UNFINISHED;
 
@@ -38,6 +39,11 @@ pub(super) fn write(folder: &Path, order: &Order, arguments: &MapArguments, maps
         html(&Filled { title: &order.title, axes: order.axes(), maps }, &origin(order, arguments, &command_line(arguments), &[("map.svg", &svg)]));
     files.push(write_into(folder, "map.html", page)?);
     Ok(files)
+}
+
+/// Returns whether a folder has the merged result of these maps, of which `page` is the page.
+pub(super) fn has_result(folder: &Path, pieces: &[Piece], page: &str, order: &Order, arguments: &MapArguments) -> bool {
+    crate::shard::has_result(folder, pieces, page, &origin(order, arguments, &command_line(arguments), &[]))
 }
 
 /// Returns the command that makes the files, as a line for a shell.

@@ -11,7 +11,7 @@ use cohaptic_campaign::Shard;
 use cohaptic_files::{OwnFolder, PARTIAL};
 use cohaptic_stability::{Map, MapError, MapRow};
 
-use super::Order;
+use super::{Order, files};
 use crate::analysis_watch::CellWatch;
 use crate::arguments::MapArguments;
 use crate::failure::Failure;
@@ -150,7 +150,9 @@ fn are_all_there(order: &Order, kept: Kept<'_>) -> Result<(), Failure> {
 pub(super) fn status(order: &Order, arguments: &MapArguments, folder: &Path) -> Result<ExitCode, Failure> {
     let header = header(order, arguments, WHAT)?;
     let kept = Kept { folder, name: ROWS, header: &header };
-    show(arguments.scene.json, folder, NAMES, &pieces(order, kept)?, false)
+    let pieces = pieces(order, kept)?;
+    let is_merged = files::has_result(folder, &pieces, "map.html", order, arguments);
+    show(arguments.scene.json, folder, NAMES, &pieces, is_merged)
 }
 
 /// Destination of finished rows, with the first failure to write. Shared by all threads of the computation.

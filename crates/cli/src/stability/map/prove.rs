@@ -65,7 +65,11 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, shar
             let done = proofs.shard(shard, |variant, error| failure(order, arguments, variant, error))?;
             return shard::answer(arguments.scene.json, &done);
         }
-        (Sharing::Status(folder), Some(proofs)) => return shard::show(arguments.scene.json, folder, proof_blocks::NAMES, &proofs.pieces()?, false),
+        (Sharing::Status(folder), Some(proofs)) => {
+            let pieces = proofs.pieces()?;
+            let is_merged = files::has_result(folder, &pieces, "proof.html", order, arguments);
+            return shard::show(arguments.scene.json, folder, proof_blocks::NAMES, &pieces, is_merged);
+        }
         (Sharing::Merge(_) | Sharing::Whole(_), _) | (_, None) => {}
     }
     let (_own, rows) = proofs.map_or(Ok((None, Vec::new())), |proofs| proofs.rows(sharing))?;
