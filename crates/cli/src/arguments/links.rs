@@ -38,9 +38,10 @@ pub(crate) struct LinkArguments {
     /// Meaning of words of tc-netem: what they say, or what Linux 6.6 does
     #[arg(long, value_enum, default_value_t = Profile::Exact)]
     pub(crate) profile: Profile,
-    /// Send packets that can carry a congestion mark: they are marked where others would be dropped
-    #[arg(long)]
-    pub(crate) ecn: bool,
+    /// Send packets that can carry a congestion mark: they are marked where others would be dropped. classic is ECT(0); l4s is ECT(1), to which the queue
+    /// dualpi2 gives a queue of its own
+    #[arg(long, value_enum, value_name = "KIND", num_args = 0..=1, require_equals = true, default_missing_value = "classic")]
+    pub(crate) ecn: Option<EcnKind>,
     /// Print one JSON document and nothing else
     #[arg(long)]
     pub(crate) json: bool,
@@ -53,6 +54,22 @@ pub(crate) struct LinkArguments {
     /// Draw the delay of each packet, the distribution of the delays, and the rates of what arrived and of cross-traffic
     #[arg(long, value_name = "FILE.svg")]
     pub(crate) picture: Option<PathBuf>,
+}
+
+/// Codepoint of the packets of `cohaptic link --ecn`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, clap::ValueEnum)]
+pub(crate) enum EcnKind {
+    Classic,
+    L4s,
+}
+
+impl EcnKind {
+    pub(crate) const fn codepoint(self) -> cohaptic_units::Ecn {
+        match self {
+            Self::Classic => cohaptic_units::Ecn::Capable0,
+            Self::L4s => cohaptic_units::Ecn::Capable1,
+        }
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, clap::ValueEnum)]

@@ -29,7 +29,7 @@ pub(crate) use falcon::{
     FalconArguments, FalconCommand, Force, HandName, HomeArguments, ProbeArguments, SimulateArguments, WatchArguments, WhichFalcon,
 };
 pub(crate) use join::{JoinArguments, JoinDevice};
-pub(crate) use links::{FitArguments, LinkArguments, Profile};
+pub(crate) use links::{EcnKind, FitArguments, LinkArguments, Profile};
 pub(crate) use pages::{CompletionsArguments, FileKind, InitArguments, ManArguments, SchemaArguments};
 pub(crate) use paper::PaperArguments;
 pub(crate) use realtime::{LiveArguments, PaceArguments, PlayArguments, RealTimeArguments, RelayArguments, RouterArguments};

@@ -16,7 +16,7 @@ use cohaptic_measure::steady::SteadyStream;
 use cohaptic_units::Ecn;
 use cohaptic_wan::{Link, LinkName, PacketInfo, PacketRecord};
 
-use crate::arguments::LinkArguments;
+use crate::arguments::{EcnKind, LinkArguments};
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::file::unwritten;
@@ -46,7 +46,7 @@ pub(crate) fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
 fn drive(arguments: &LinkArguments, spec: Spec) -> Result<(Measured, Written), Failure> {
     // A replay without `--packets` offers as many packets as the log has.
     let wanted = arguments.packets.map(Into::into).or(spec.packets).unwrap_or(PACKETS);
-    let info = PacketInfo { size: arguments.size, ecn: if arguments.ecn { Ecn::Capable0 } else { Ecn::NotCapable } };
+    let info = PacketInfo { size: arguments.size, ecn: arguments.ecn.map_or(Ecn::NotCapable, EcnKind::codepoint) };
     let stream = SteadyStream { packets: wanted, every: arguments.every, info };
     if let Some(why) = too_long(&stream) {
         return Err(Failure::Input(why.to_owned()));

@@ -123,6 +123,12 @@ fn packets_that_can_be_marked_are() {
     let fates = |line: &str| desk.json(&format!("link loss 10% ecn --packets 1000 --json{line}"))["fates"].clone();
     assert_eq!((fates(" --ecn")["dropped"]["loss"].as_u64(), fates("")["marked"].as_u64()), (Some(0), Some(0)));
     assert!(fates(" --ecn")["marked"].as_u64() > Some(50) && fates("")["dropped"]["loss"].as_u64() > Some(50));
+    // The queue of DualPI2 for scalable senders marks beyond a wait of 1 ms, and the classic queue later: 64 bytes at 500 kbit/s take 1.024 ms.
+    let marked = |ecn: &str| {
+        let line = format!("link rate=500kbit 'queue={{discipline=\"dualpi2\",limit=\"9kB\"}}' --packets 2000 --json{ecn}");
+        desk.json(&line)["fates"]["marked"].as_u64().unwrap()
+    };
+    assert!(marked(" --ecn=l4s") > 2 * marked(" --ecn=classic") && marked(" --ecn=classic") == marked(" --ecn"));
 }
 
 #[test]
