@@ -1,9 +1,10 @@
-//! Bytes of a capture: the three kinds of pcapng blocks, little-endian (draft-ietf-opsawg-pcapng, sections 4.1 to 4.3), and a UDP datagram in IPv4 around a
-//! payload (RFC 791, RFC 768).
+//! Bytes of a capture: the three kinds of pcapng blocks, little-endian (draft-ietf-opsawg-pcapng, sections 4.1 to 4.3), and a UDP datagram in IPv4 or
+//! IPv6 around a payload (RFC 791, RFC 8200, RFC 768).
 //!
 //! The functions append to a `Vec` and know nothing of packets of an emulator: [`CaptureWriter`](super::CaptureWriter) passes numbers, bytes and comments.
 
 use std::borrow::Cow;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
 const SECTION_HEADER: u32 = 0x0A0D_0D0A;
 const INTERFACE_DESCRIPTION: u32 = 1;
@@ -117,11 +118,8 @@ const UDP_HEADER: usize = 8;
 /// Length of the longest UDP payload \[byte\], limited by the 16 bits of the length in the IP header.
 const LONGEST_PAYLOAD: usize = 65_535 - IP_HEADER - UDP_HEADER;
 
-const SOURCE: [u8; 4] = [192, 0, 2, 1];
-const DESTINATION: [u8; 4] = [192, 0, 2, 2];
-const SOURCE_PORT: u16 = 49_152;
-const DESTINATION_PORT: u16 = 49_153;
 const UDP: u8 = 17;
+const HOPS_LEFT: u8 = 64;
 /// Codepoint "congestion experienced" of the ECN field (RFC 3168).
 const CONGESTION_EXPERIENCED: u8 = 0b11;
 
@@ -133,38 +131,55 @@ pub(super) struct Frame<'a> {
     pub(super) length: usize,
 }
 
-/// Builds the frame of UDP datagram number `sequence` with a payload of `size` bytes, of which the first `payload.len()` bytes are known.
-pub(super) fn build(sequence: u64, marked: bool, payload: &[u8], size: usize) -> Frame<'static> {
+/// Addresses in the frames of packets without known addresses (RFC 5737).
+pub(super) const UNKNOWN: [SocketAddr; 2] =
+    [SocketAddr::new(IpAddr::V4(Ipv4Addr::new(192, 0, 2, 1)), 49_152), SocketAddr::new(IpAddr::V4(Ipv4Addr::new(192, 0, 2, 2)), 49_153)];
+
+/// Builds the frame of UDP datagram number `sequence` with a payload of `size` bytes, of which the first `payload.len()` bytes are known. Both ends have
+/// addresses of one version of IP.
+pub(super) fn build(sequence: u64, marked: bool, [source, destination]: [SocketAddr; 2], payload: &[u8], size: usize) -> Frame<'static> {
     let payload_length = size.max(payload.len()).min(LONGEST_PAYLOAD);
     // A payload shorter than `size` stays short: the frame is then marked as cut off.
     let payload = &payload[..payload.len().min(LONGEST_PAYLOAD)];
-    let [ip_length, udp_length] = [IP_HEADER + UDP_HEADER + payload_length, UDP_HEADER + payload_length].map(sixteen_bits);
+    let udp_length = sixteen_bits(UDP_HEADER + payload_length);
+    let congestion = if marked { CONGESTION_EXPERIENCED } else { 0 };
+    let addresses = [source, destination].map(|end| match end.ip() {
+        IpAddr::V4(v4) => v4.octets().to_vec(),
+        IpAddr::V6(v6) => v6.octets().to_vec(),
+    });
 
-    let mut ip = [0; IP_HEADER];
-    ip[0] = 0x45; // version 4, five words of header
-    ip[1] = if marked { CONGESTION_EXPERIENCED } else { 0 };
-    ip[2..4].copy_from_slice(&ip_length);
-    // The last two bytes, so the identification is the sequence number modulo 2^16.
-    ip[4..6].copy_from_slice(&sequence.to_be_bytes()[6..]);
-    ip[8] = 64; // hops left
-    ip[9] = UDP;
-    ip[12..16].copy_from_slice(&SOURCE);
-    ip[16..20].copy_from_slice(&DESTINATION);
-    let checksum = !sum(0, &ip);
-    ip[10..12].copy_from_slice(&checksum.to_be_bytes());
+    let ip = if source.is_ipv4() {
+        let mut ip = vec![0; IP_HEADER];
+        ip[0] = 0x45; // version 4, five words of header
+        ip[1] = congestion;
+        ip[2..4].copy_from_slice(&sixteen_bits(IP_HEADER + UDP_HEADER + payload_length));
+        // The last two bytes, so the identification is the sequence number modulo 2^16.
+        ip[4..6].copy_from_slice(&sequence.to_be_bytes()[6..]);
+        ip[8] = HOPS_LEFT;
+        ip[9] = UDP;
+        ip[12..].copy_from_slice(&addresses.concat());
+        let checksum = !sum(0, &ip);
+        ip[10..12].copy_from_slice(&checksum.to_be_bytes());
+        ip
+    } else {
+        // RFC 8200: version 6, the traffic class across two bytes, no flow label.
+        [&[0x60, congestion << 4, 0, 0, udp_length[0], udp_length[1], UDP, HOPS_LEFT][..], &addresses.concat()].concat()
+    };
 
     let mut udp = [0; UDP_HEADER];
-    udp[0..2].copy_from_slice(&SOURCE_PORT.to_be_bytes());
-    udp[2..4].copy_from_slice(&DESTINATION_PORT.to_be_bytes());
+    udp[0..2].copy_from_slice(&source.port().to_be_bytes());
+    udp[2..4].copy_from_slice(&destination.port().to_be_bytes());
     udp[4..6].copy_from_slice(&udp_length);
     // The checksum covers the whole payload. With a cut payload the field stays zero, which means "no checksum" in IPv4.
     if payload.len() == payload_length {
-        let pseudo_header = [&SOURCE[..], &DESTINATION, &[0, UDP], &udp_length].concat();
+        // The pseudo headers of both versions have the same sum: addresses, protocol and length.
+        let pseudo_header = [&addresses.concat()[..], &[0, UDP], &udp_length].concat();
         let checksum = !sum(sum(sum(0, &pseudo_header), &udp), payload);
         // A computed zero is sent as all ones, the other zero of ones' complement, because a zero field means "no checksum".
         udp[6..8].copy_from_slice(&if checksum == 0 { u16::MAX } else { checksum }.to_be_bytes());
     }
-    Frame { captured: [&ip[..], &udp, payload].concat().into(), length: IP_HEADER + UDP_HEADER + payload_length }
+    let length = ip.len() + UDP_HEADER + payload_length;
+    Frame { captured: [&ip[..], &udp, payload].concat().into(), length }
 }
 
 fn sixteen_bits(length: usize) -> [u8; 2] {
@@ -189,7 +204,7 @@ mod tests {
     fn no_payload_has_the_checksum_that_means_none() {
         let mut other_zero = 0;
         for payload in 0..=u16::MAX {
-            let Frame { captured, .. } = build(1, false, &payload.to_be_bytes(), 2);
+            let Frame { captured, .. } = build(1, false, UNKNOWN, &payload.to_be_bytes(), 2);
             assert_ne!(captured[26..28], [0, 0]);
             other_zero += u32::from(captured[26..28] == [0xff, 0xff]);
         }

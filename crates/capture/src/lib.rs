@@ -13,7 +13,8 @@
 //!
 //! In an analyser, the filter `frame.comment contains "dropped"` then shows the lost packets. The frames are raw IPv4 (`LINKTYPE_RAW`) with UDP, with both
 //! checksums, from 192.0.2.1:49152 to 192.0.2.2:49153 (RFC 5737: addresses of documentation). The IP identification is the number of the packet modulo 2¹⁶.
-//! A congestion mark is the CE codepoint. A packet with known headers is written unchanged ([`CaptureWriter::write_packet`]). Time zero is 1970-01-01 00:00
+//! A congestion mark is the CE codepoint. A packet with known headers is written unchanged ([`CaptureWriter::write_packet`]),
+//! and a datagram with known addresses has these addresses ([`CaptureWriter::write_datagram`]). Time zero is 1970-01-01 00:00
 //! UTC, and timestamps count nanoseconds.
 //!
 //! ```
@@ -38,6 +39,7 @@ mod block;
 
 use std::fmt;
 use std::io::{self, Write};
+use std::net::SocketAddr;
 
 use cohaptic_units::print::Span;
 use cohaptic_wan::{Fate, PacketRecord, PathPart};
@@ -83,8 +85,17 @@ impl<W: Write> CaptureWriter<W> {
     ///
     /// The errors of the writer.
     pub fn write(&mut self, record: &PacketRecord<impl Copy + Into<PathPart>>, payload: &[u8]) -> io::Result<()> {
+        self.write_datagram(record, block::UNKNOWN, payload)
+    }
+
+    /// Writes a frame as [`CaptureWriter::write`], for a datagram with known source and destination, both of one version of IP.
+    ///
+    /// # Errors
+    ///
+    /// The errors of the writer.
+    pub fn write_datagram(&mut self, record: &PacketRecord<impl Copy + Into<PathPart>>, ends: [SocketAddr; 2], payload: &[u8]) -> io::Result<()> {
         let size = usize::try_from(record.size.get()).unwrap_or(usize::MAX);
-        let datagram = block::build(record.sequence, record.marked, payload, size);
+        let datagram = block::build(record.sequence, record.marked, ends, payload, size);
         self.write_frame(record, &datagram)
     }
 

@@ -171,3 +171,32 @@ fn a_packet_that_is_known_is_written_as_it_is() {
     let comment = Comment(record.with_path(PathPart::Link)).to_string();
     assert_eq!(frames, [Frame { nanos: 9, original: 44, data: packet, comment }]);
 }
+
+#[test]
+fn a_datagram_between_known_ends_has_their_addresses() {
+    let record = PacketRecord { marked: true, ..delivered(3, 9, 3) };
+    for (ends, header, first) in
+        [(["10.0.0.1:5000", "203.0.113.7:7"], 20, [0x45, 3, 0, 31]), (["[fd00::1]:5000", "[fd00::2]:7"], 40, [0x60, 0x30, 0, 0])]
+    {
+        let ends = ends.map(|end| end.parse::<SocketAddr>().unwrap());
+        let mut writer = CaptureWriter::new(Vec::new(), "left->right").unwrap();
+        writer.write_datagram(&record, ends, b"abc").unwrap();
+        let frames = frames_by_library(&writer.finish().unwrap());
+        let data = &frames[0].data;
+        assert_eq!((&data[..4], data.len(), frames[0].original), (&first[..], header + 11, header + 11));
+        let addresses = ends.map(|end| match end.ip() {
+            std::net::IpAddr::V4(v4) => v4.octets().to_vec(),
+            std::net::IpAddr::V6(v6) => v6.octets().to_vec(),
+        });
+        let addresses = addresses.concat();
+        assert_eq!(data[header - addresses.len()..header], addresses[..]);
+        assert_eq!(data[header..header + 6], [0x13, 0x88, 0, 7, 0, 11]);
+        let pseudo = [&addresses[..], &[0, 17, 0, 11], &data[header..]].concat();
+        assert_eq!(ones_complement(&pseudo), 0xffff);
+        if header == 20 {
+            assert_eq!(ones_complement(&data[..20]), 0xffff);
+        } else {
+            assert_eq!(data[4..8], [0, 11, 17, 64], "length, protocol and hops left");
+        }
+    }
+}

@@ -169,8 +169,9 @@ impl AddressPlan {
         self.owners.iter_mut().skip(Self::place(number)).take(1).for_each(|owner| owner[version] = None);
     }
 
-    /// Gives a host addresses that no host has had. The former addresses belong to no host from now on.
-    pub(crate) fn change(&mut self, host: NodeId) -> Addresses {
+    /// Gives a host addresses that no host has had. The former addresses belong to no host from now on. `inside` is the address of IPv4 of a host behind a
+    /// NAT, in short form.
+    pub(crate) fn change(&mut self, host: NodeId, inside: Option<u32>) -> Addresses {
         let before = self.current[host.index()];
         for (version, short) in before.into_iter().enumerate() {
             // The key stays if the address was chosen, so that the address is not given in turn.
@@ -180,6 +181,11 @@ impl AddressPlan {
         }
         let number = self.fresh(host);
         self.current[host.index()] = [number; 2];
+        if let Some(inside) = inside {
+            self.let_go(0, number);
+            self.chosen.insert((false, inside), host);
+            self.current[host.index()][0] = inside;
+        }
         self.of(host)
     }
 
@@ -312,7 +318,7 @@ mod tests {
             let ip: IpAddr = address.parse().unwrap();
             assert_eq!(plan.is_own(NodeId::new(0), Addresses::short(ip), ip.is_ipv6()), is_own, "{address}");
         }
-        let moved = plan.change(NodeId::new(2));
+        let moved = plan.change(NodeId::new(2), None);
         assert_eq!((moved.v4.to_string(), moved.v6.to_string()), ("10.0.0.6".into(), "fd00::6".into()));
         assert_eq!((owner(&plan, "192.168.1.10"), owner(&plan, "fd00::4"), owner(&plan, "10.0.0.6")), (None, None, Some("c".into())));
         for text in ["127.0.0.1", "0.0.0.0", "224.0.0.1", "255.255.255.255", "10.255.255.255", "250.0.0.1", "::1", "::", "fe80::1", "fd00::1:0:1"] {

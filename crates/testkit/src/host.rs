@@ -118,7 +118,7 @@ impl Host {
     #[cfg(feature = "tcp")]
     pub async fn connect(&self, address: impl ToSocketAddrs) -> io::Result<crate::TcpStream> {
         self.shared.check_open(self.node, "a connection")?;
-        crate::TcpStream::connect_to(&self.shared, self.node, address.to_socket_addrs()?).await
+        crate::TcpStream::connect_to(&self.shared, self.node, current::on_host(Some(self.node), || address.to_socket_addrs())?).await
     }
 
     /// Runs a future as a task of this host: sockets made by the future belong to this host. Needed for tasks started with `tokio::spawn`, because such tasks

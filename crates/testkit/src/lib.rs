@@ -118,7 +118,9 @@ mod link;
 #[cfg(feature = "loopback")]
 #[doc(hidden)]
 pub mod loopback;
+mod middlebox;
 mod names;
+mod nat;
 #[cfg(feature = "tcp")]
 pub mod net;
 pub mod node;
@@ -149,7 +151,7 @@ mod words;
 pub use access::AccessStats;
 pub use address::{AddressPlan, Addresses};
 pub use artefacts::{ARTEFACTS_VARIABLE, WriteError};
-pub use bed::{Bed, Testbed};
+pub use bed::{Bed, Nat, NatMapping, NatProtocol, Testbed};
 #[cfg(feature = "scenes")]
 pub use cohaptic_harness as harness;
 pub use cohaptic_units as units;

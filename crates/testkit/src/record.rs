@@ -68,6 +68,11 @@ impl Record {
         self.recorded.said.lines(self.recorded.trace.hosts())
     }
 
+    /// Returns the line of a link file for each NAT and firewall. NATs and firewalls are the last names of the trace.
+    pub(crate) fn middleboxes(&self) -> impl Iterator<Item = &str> {
+        self.recorded.said.middleboxes().map(|(line, _)| line)
+    }
+
     pub(crate) fn packets_of(&self, path: Path) -> impl Iterator<Item = &Seen> {
         self.recorded.packets.iter().filter(move |seen| seen.path == path)
     }

@@ -5,6 +5,7 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, SocketAddrV4, SocketAddrV
 
 use crate::address::Addresses;
 use crate::context;
+use crate::current;
 
 /// Description of socket addresses, in the forms of tokio's trait of this name: addresses, or the name of a host of the running test bed or a literal address,
 /// with a port.
@@ -187,10 +188,27 @@ impl<T: ToSocketAddrs + ?Sized> ToSocketAddrs for &T {
 /// Returns the addresses of a host, and whether the address of IPv6 comes first.
 fn look_up(name: &str) -> io::Result<(Addresses, bool)> {
     let shared = context::shared().ok_or_else(|| context::outside(&format!("the name `{name}` of a host means something")))?;
-    let found = shared.with(|core| core.plan.addresses(name).map(|addresses| (addresses, core.settings.six_first)));
-    found.ok_or_else(|| {
-        // A program that looks up a wrong name again and again lets no time pass, so the call is counted.
-        shared.note_call();
-        io::Error::new(io::ErrorKind::NotFound, shared.names().unknown(name))
-    })
+    let found = shared.with(|core| {
+        let host = shared.names().find(name)?;
+        // A program of no host sees the whole network, as the test does.
+        let hidden = current::host().and_then(|asking| core.hides(asking, host));
+        Some(hidden.map_or_else(|| Ok((core.plan.of(host), core.settings.six_first)), Err))
+    });
+    found
+        .map_or_else(
+            || Err(shared.names().unknown(name)),
+            |found| {
+                found.map_err(|nat| {
+                    format!(
+                        "there is no host `{name}` here: the host is behind the NAT `{}`, and only hosts behind that NAT know its name",
+                        shared.names()[nat.index()]
+                    )
+                })
+            },
+        )
+        .map_err(|text| {
+            // A program that looks up a wrong name again and again lets no time pass, so the call is counted.
+            shared.note_call();
+            io::Error::new(io::ErrorKind::NotFound, text)
+        })
 }

@@ -10,6 +10,7 @@ use cohaptic_wan::{NodeId, Path};
 use crate::access::AccessLines;
 use crate::again::Said;
 use crate::hit::Laws;
+use crate::middlebox::Middlebox;
 
 /// Settings of a run.
 #[derive(Clone, Debug)]
@@ -38,6 +39,8 @@ pub(crate) struct Settings {
     pub(crate) laws: Laws,
     /// Access lines of hosts with access lines.
     pub(crate) access: BTreeMap<NodeId, AccessLines>,
+    /// NATs and firewalls. Each stands after all that are behind it.
+    pub(crate) middleboxes: Vec<Middlebox>,
     /// Link for packets of the sender to itself; `None` if such packets arrive at once. The receiver of the link is a host without programs.
     pub(crate) loopback: Option<Path>,
 }

@@ -11,7 +11,9 @@ use cohaptic_wan::{LinkModel, NodeId, Path};
 use crate::file::LinkFile;
 use crate::hit::{Laws, PacketLaw, PathHit, SentPacket, Verdict};
 use crate::link::{LinkChange, ToLink};
+use crate::middlebox::{Middlebox, Topology, check_size};
 use crate::names::Names;
+use crate::nat::Behaviour;
 use crate::settings::{Limits, Settings};
 use crate::watch::LIMIT;
 use crate::wire::BYTE_LIMIT;
@@ -64,6 +66,7 @@ impl Setup {
                 said: Arc::default(),
                 laws: Laws::default(),
                 access: BTreeMap::new(),
+                middleboxes: Vec::new(),
                 loopback: None,
             },
             artefacts: None,
@@ -74,6 +77,58 @@ impl Setup {
     /// Adds a host.
     pub(crate) fn add(&mut self, name: &str) {
         Arc::make_mut(&mut self.names).add(name.to_owned());
+    }
+
+    /// Returns the number of hosts. NATs and firewalls have the last names, and do not count.
+    pub(crate) fn hosts(&self) -> usize {
+        self.names.len() - self.settings.middleboxes.len()
+    }
+
+    /// Adds a NAT, or a firewall if `translates` is false, with the hosts named `inside` behind.
+    ///
+    /// # Panics
+    ///
+    /// If there are no such hosts, if one of them is behind another NAT or firewall, or if another host has the name.
+    #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
+    pub(crate) fn add_middlebox(&mut self, name: &str, behaviour: Behaviour, translates: bool, inside: &[&str]) {
+        let inside: Vec<NodeId> = inside.iter().map(|host| self.names.node(host)).collect();
+        if let Err(fault) = check_size(self.settings.middleboxes.iter().filter(|middlebox| middlebox.translates).count(), translates, inside.len()) {
+            panic!("`{name}` cannot be added: {fault}");
+        }
+        for (place, node) in inside.iter().enumerate() {
+            let host = &self.names[node.index()];
+            assert!(!inside[..place].contains(node), "host `{host}` is named twice behind `{name}`: name it once");
+            if let Some(other) = self.settings.middleboxes.iter().find(|middlebox| middlebox.inside.contains(node)) {
+                panic!("host `{host}` is behind `{}` already, and cannot be behind `{name}` as well", self.names[other.node.index()]);
+            }
+        }
+        self.add(name);
+        let middlebox = Middlebox { node: NodeId::new(self.names.len() - 1), behaviour, translates, inside };
+        Arc::make_mut(&mut self.settings.said).add_middlebox(middlebox.line(&self.names), middlebox.call(&self.names));
+        self.settings.middleboxes.push(middlebox);
+    }
+
+    /// Checks that each link, law and access line can carry packets: hosts behind a NAT have links to the NAT and to each other alone.
+    ///
+    /// # Panics
+    ///
+    /// If a link is named that does not exist.
+    pub(crate) fn check_links(&self) {
+        if self.settings.middleboxes.is_empty() {
+            return;
+        }
+        let topology = Topology::new(self.names.len(), &self.settings.middleboxes);
+        let changed = self.changes.iter().map(|change| Path { from: NodeId::new(change.from), to: NodeId::new(change.to) });
+        for path in self.links.keys().copied().chain(changed).chain(self.settings.laws.iter().map(|law| law.path)) {
+            assert!(topology.is_link(path.from, path.to), "{}", no_link(&self.names, path));
+        }
+        for Middlebox { node, .. } in &self.settings.middleboxes {
+            assert!(
+                !self.settings.access.contains_key(node),
+                "`{}` cannot have access lines, because packets from inside would pass its downlink: give its links to and from the hosts outside words",
+                self.names[node.index()]
+            );
+        }
     }
 
     /// Sets the link of every path that is not set by itself.
@@ -118,7 +173,12 @@ impl Setup {
 
     /// Sets all links, their changes, the access lines, the hits and the seed as a file says. The setup must have the hosts of the file.
     pub(crate) fn read(&mut self, file: LinkFile) {
-        let LinkFile { hosts, every, links, changes, access, hits, seed } = file;
+        let LinkFile { hosts, middleboxes, every, links, changes, access, hits, seed } = file;
+        // Packets of state machines have no addresses that a NAT could translate.
+        assert!(
+            self.noun == "host" || middleboxes.is_empty(),
+            "the file has NATs or firewalls, which pass packets of sockets alone: expected links only"
+        );
         // The setup may have the hosts of the file in another order, so the indices of the file are translated.
         let nodes: Vec<NodeId> = hosts.iter().map(|host| self.names.node(host)).collect();
         self.add_hits(&hits);
@@ -181,6 +241,12 @@ impl Setup {
         assert!(path.from != path.to, "host `{from}` has no link to itself; name two hosts");
         path
     }
+}
+
+/// Returns the message that there is no link between two hosts because of a NAT.
+pub(crate) fn no_link(names: &Names, Path { from, to }: Path) -> String {
+    let [from, to] = [from, to].map(|node| &names[node.index()]);
+    format!("`{from}` has no link to `{to}`, because a NAT or a firewall is between them: name the links on the way")
 }
 
 /// Returns the name of a law without words: the place where the test gave the law.

@@ -1,6 +1,7 @@
 //! Trace of a run, event by event, and the first difference of two traces.
 
 use std::fmt;
+use std::net::SocketAddr;
 use std::sync::Arc;
 
 use cohaptic_units::Instant;
@@ -62,6 +63,15 @@ pub enum Happening {
         /// Cause of the loss.
         why: Lost,
     },
+    /// A NAT has translated a packet, or a firewall has let the packet pass. The packet goes on over the next link.
+    Forwarded {
+        /// The packet, on the link to the NAT or the firewall.
+        packet: PacketName,
+        /// Source and destination before the NAT.
+        before: [SocketAddr; 2],
+        /// Source and destination after the NAT.
+        after: [SocketAddr; 2],
+    },
     /// A link has made a copy of a packet.
     Copied {
         /// The copy.
@@ -82,6 +92,10 @@ pub enum Happening {
     Restarted(NodeId),
     /// A host has new addresses.
     Readdressed(NodeId),
+    /// A NAT or a firewall forgot its mappings.
+    Forgotten(NodeId),
+    /// A NAT or a firewall behaves otherwise from now on.
+    Reconfigured(NodeId),
     /// The path from a host to another host was cut.
     Cut(Path),
     /// The cut of a path has ended.
@@ -119,6 +133,12 @@ pub enum Lost {
     HostDown,
     /// The host had another address when the packet arrived.
     NoSuchAddress,
+    /// The filter of a NAT or a firewall did not permit the source.
+    Filtered,
+    /// The NAT or firewall had no mapping for the packet, or no free port for a new mapping.
+    NoMapping,
+    /// The packet went from inside of a NAT to the NAT's own external address, and the NAT does not hairpin.
+    NoHairpin,
     /// No socket was bound to the port. The sender of a datagram is told.
     NoSocket,
     /// The buffer of the socket was full.
@@ -149,6 +169,9 @@ impl fmt::Display for Lost {
             Self::Cut => "the path is cut",
             Self::HostDown => "the host is down",
             Self::NoSuchAddress => "the host has another address",
+            Self::Filtered => "filtered",
+            Self::NoMapping => "no mapping",
+            Self::NoHairpin => "no hairpin",
             Self::NoSocket => "no socket at that port",
             Self::BufferFull => "the socket's buffer is full",
             Self::Checksum => "a checksum is wrong",
@@ -287,6 +310,15 @@ impl fmt::Display for Words<'_> {
                 self.packet(f, *packet)?;
                 write!(f, " lost: {why}")
             }
+            Happening::Forwarded { packet, before: [from, to], after } => {
+                self.packet(f, *packet)?;
+                let [source, destination] = after;
+                if [from, to] == [source, destination] {
+                    write!(f, " passed: {from} > {to}")
+                } else {
+                    write!(f, " translated: {from} > {to} becomes {source} > {destination}")
+                }
+            }
             Happening::Copied { packet } => {
                 self.packet(f, *packet)?;
                 f.write_str(" copied")
@@ -306,6 +338,8 @@ impl fmt::Display for Words<'_> {
             Happening::Killed(host) => write!(f, "the program of {} was killed", self.name(*host)),
             Happening::Restarted(host) => write!(f, "{} restarted", self.name(*host)),
             Happening::Readdressed(host) => write!(f, "{} has new addresses", self.name(*host)),
+            Happening::Forgotten(nat) => write!(f, "{} forgot its mappings", self.name(*nat)),
+            Happening::Reconfigured(nat) => write!(f, "{} behaves otherwise", self.name(*nat)),
             Happening::Cut(path) => {
                 self.path(f, *path)?;
                 f.write_str(" cut")

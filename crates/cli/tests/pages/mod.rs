@@ -110,6 +110,7 @@ pages! {
     how_to_named_link: "docs/how-to-named-link.md",
     how_to_map_in_a_paper: "docs/how-to-map-in-a-paper.md",
     how_to_matplotlib: "docs/how-to-matplotlib.md",
+    how_to_nat: "docs/how-to-nat.md",
     how_to_second_computer: "docs/how-to-second-computer.md",
     model: "docs/model.md",
     netem: "docs/netem.md",

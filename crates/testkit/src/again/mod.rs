@@ -70,8 +70,11 @@ impl Again {
         if !has_failed {
             text.push_str("let outcome = ");
         }
-        let _ = write!(text, "Testbed::new([{}])", self.names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", "));
-        for line in self.network(drawn) {
+        // NATs and firewalls are the last names, and have calls of their own.
+        let middleboxes: Vec<&str> = self.said.middleboxes().map(|(_, call)| call).collect();
+        let hosts = &self.names[..self.names.len() - middleboxes.len()];
+        let _ = write!(text, "Testbed::new([{}])", hosts.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", "));
+        for line in middleboxes.into_iter().map(str::to_owned).chain(self.network(drawn)) {
             let _ = write!(text, "\n        {line}");
         }
         for line in &self.others {

@@ -9,6 +9,8 @@ use cohaptic_wan::{Fate, FateLog, Path};
 use super::folder::{MARK, MARKED};
 use crate::record::Record;
 use crate::trace::Lost;
+#[cfg(feature = "pcapng")]
+use crate::wire::Form;
 
 /// Returns the names and contents of the files of a record.
 pub(super) fn files(record: &Record) -> Vec<(String, Vec<u8>)> {
@@ -53,7 +55,9 @@ pub(super) fn files(record: &Record) -> Vec<(String, Vec<u8>)> {
     );
     let asked: String = record.network().iter().map(|line| format!("# {line}\n")).collect();
     let asked = if asked.is_empty() { asked } else { format!("# The links of the test:\n{asked}") };
-    let links = format!("# The fate of each packet, link by link.\n{asked}seed: {}\nhosts: {}\n{links}", seed.value, hosts.join(" "));
+    let boxes: String = record.middleboxes().map(|line| format!("{line}\n")).collect();
+    let hosts = hosts[..hosts.len() - record.middleboxes().count()].join(" ");
+    let links = format!("# The fate of each packet, link by link.\n{asked}seed: {}\nhosts: {hosts}\n{boxes}{links}", seed.value);
     files.push((MARKED.to_owned(), summary.into_bytes()));
     files.push(("trace.txt".to_owned(), trace.into_bytes()));
     files.push(("links.txt".to_owned(), links.into_bytes()));
@@ -83,34 +87,21 @@ fn counts(record: &Record, path: Path, log: &FateLog) -> String {
 
 #[cfg(feature = "pcapng")]
 fn capture(record: &Record, path: Path, from: &str, to: &str) -> Vec<u8> {
-    #[cfg(feature = "tcp")]
-    let segments = segments(record, path);
     let write = || -> std::io::Result<Vec<u8>> {
         let mut capture = cohaptic_capture::CaptureWriter::new(Vec::new(), &format!("{from} -> {to}"))?;
         for seen in record.packets_of(path) {
-            let packet = seen.record.with_path(seen.part);
-            #[cfg(feature = "tcp")]
-            // A segment is a whole IP packet. A datagram is a content, around which the writer puts headers.
-            if segments.contains(&packet.sequence) {
-                capture.write_packet(&packet, &seen.payload)?;
-                continue;
+            let (packet, (bytes, form)) = (seen.record.with_path(seen.part), &seen.payload);
+            match form {
+                #[cfg(feature = "tcp")]
+                Form::Packet => capture.write_packet(&packet, bytes)?,
+                Form::Datagram(ends) => capture.write_datagram(&packet, *ends, bytes)?,
+                Form::Content => capture.write(&packet, bytes)?,
             }
-            capture.write(&packet, &seen.payload)?;
         }
         capture.finish()
     };
     // Writing to memory cannot fail.
     write().unwrap_or_default()
-}
-
-/// Returns the numbers of the whole IP packets of a path, that is, of the packets of TCP.
-#[cfg(all(feature = "pcapng", feature = "tcp"))]
-fn segments(record: &Record, path: Path) -> std::collections::BTreeSet<u64> {
-    let number = |event: &crate::TraceEvent| {
-        let crate::Happening::Segment { packet, .. } = event.what else { return None };
-        (packet.path == path).then_some(packet.sequence)
-    };
-    record.trace().events().iter().filter_map(number).collect()
 }
 
 /// Maximum length of the part of a file's name for a host's name \[characters\].

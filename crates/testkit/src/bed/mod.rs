@@ -5,6 +5,7 @@ mod again;
 mod hitting;
 #[cfg(feature = "loopback")]
 mod loopback;
+mod nat;
 #[cfg(feature = "strategies")]
 mod network;
 mod running;
@@ -22,6 +23,7 @@ use std::time::Duration;
 #[cfg(feature = "tcp")]
 use cohaptic_wan::NodeId;
 
+pub use nat::{Nat, NatMapping, NatProtocol};
 pub use running::Bed;
 
 use crate::artefacts::Artefacts;
@@ -38,6 +40,7 @@ use crate::tcp::TcpConfig;
 use crate::trace::Trace;
 use crate::watch::{Kind, Watched};
 use crate::wire::Recorded;
+use crate::words::MiddleboxLine;
 
 /// Test bed: hosts, the links between the hosts, and the settings of a run. A program runs on the hosts in virtual time.
 ///
@@ -106,7 +109,7 @@ impl Testbed {
     /// Returns the names of the hosts.
     #[must_use]
     pub fn hosts(&self) -> &[String] {
-        &self.setup.names
+        &self.setup.names[..self.setup.hosts()]
     }
 
     /// Sets all links that no call of [`Testbed::link`] names, whether before or after this call. A link is a model, or words of `tc-netem`.
@@ -345,6 +348,7 @@ impl Testbed {
     ) -> (T, Record) {
         let again = self.again(seed, origin);
         let mut setup = self.setup;
+        setup.check_links();
         let artefacts = Artefacts::new(setup.artefacts.take(), seed);
         failure::install();
         if artefacts.is_wanted() {
@@ -398,7 +402,12 @@ impl Testbed {
 
 impl From<LinkFile> for Testbed {
     fn from(file: LinkFile) -> Self {
-        let mut bed = Self::new(&*file.hosts);
+        let mut bed = Self::new(file.hosts());
+        for MiddleboxLine { behaviour, translates, inside } in &file.middleboxes {
+            let name = &file.hosts[bed.setup.names.len()];
+            let inside: Vec<&str> = inside.iter().map(|host| &*file.hosts[*host]).collect();
+            bed.setup.add_middlebox(name, behaviour.clone(), *translates, &inside);
+        }
         bed.setup.read(file);
         bed
     }

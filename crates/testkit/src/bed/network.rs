@@ -14,7 +14,7 @@ impl Testbed {
     ///
     /// If the numbers of hosts differ.
     pub fn network(mut self, network: &ImpairedNetwork) -> Self {
-        let hosts = self.setup.names.len();
+        let hosts = self.setup.hosts();
         assert!(network.hosts() == hosts, "the network has {} hosts and the test bed has {hosts}: expected the same number", network.hosts());
         for (from, to, link) in network.links() {
             self.setup.set_path(Path { from, to }, link);

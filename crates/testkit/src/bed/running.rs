@@ -7,7 +7,7 @@ use std::panic::Location;
 use std::sync::Arc;
 
 use cohaptic_units::Instant;
-use cohaptic_wan::{LinkStats, NodeId};
+use cohaptic_wan::{LinkStats, NodeId, Path};
 
 use crate::access::AccessStats;
 use crate::address::AddressPlan;
@@ -16,13 +16,14 @@ use crate::core::Shared;
 use crate::host::Host;
 use crate::link::ToLink;
 use crate::names::Names;
+use crate::setup::no_link;
 use crate::task::JoinHandle;
 use crate::trace::{Happening, Trace};
 
 /// Handle of the test bed for a running program: access to hosts, links, faults and the record.
 #[derive(Clone)]
 pub struct Bed {
-    shared: Arc<Shared>,
+    pub(super) shared: Arc<Shared>,
 }
 
 impl Bed {
@@ -34,16 +35,19 @@ impl Bed {
     ///
     /// # Panics
     ///
-    /// If no host has the name.
+    /// If no host has the name, or a NAT or a firewall has the name.
     #[must_use]
     pub fn host(&self, name: &str) -> Host {
-        Host::new(Arc::clone(&self.shared), self.names().node(name))
+        let node = self.names().node(name);
+        assert!(!self.shared.with(|core| core.is_middlebox(node)), "`{name}` is a NAT or a firewall, and runs no programs: `Bed::nat` returns it");
+        Host::new(Arc::clone(&self.shared), node)
     }
 
     /// Returns all hosts, in the order of naming.
     #[must_use]
     pub fn hosts(&self) -> Vec<Host> {
-        (0..self.names().len()).map(|host| Host::new(Arc::clone(&self.shared), NodeId::new(host))).collect()
+        let hosts = self.shared.with(|core| core.hosts());
+        (0..hosts).map(|host| Host::new(Arc::clone(&self.shared), NodeId::new(host))).collect()
     }
 
     /// Returns the present addresses of all hosts.
@@ -126,7 +130,7 @@ impl Bed {
     ///
     /// If there is no such host, if both hosts are the same, or if the words describe no link.
     pub fn set_link(&self, from: &str, to: &str, link: impl ToLink) {
-        let path = self.names().path(from, to);
+        let path = self.link_path(from, to);
         assert!(path.from != path.to, "host `{from}` has no link to itself; name two hosts");
         let link = link.to_link();
         self.shared.with(|core| core.set_link(path, link));
@@ -139,7 +143,7 @@ impl Bed {
     /// If there is no such link.
     #[must_use]
     pub fn link_stats(&self, from: &str, to: &str) -> LinkStats {
-        let path = self.names().path(from, to);
+        let path = self.link_path(from, to);
         self.shared.with(|core| core.wire.link_stats(path)).unwrap_or_else(|| unreachable_link(from))
     }
 
@@ -161,7 +165,7 @@ impl Bed {
     /// If there is no such host.
     #[must_use]
     pub fn hits(&self, from: &str, to: &str) -> u64 {
-        let path = self.names().path(from, to);
+        let path = self.link_path(from, to);
         self.shared.with(|core| core.wire.hits(path))
     }
 
@@ -192,11 +196,22 @@ impl Bed {
     }
 
     fn set_cut(&self, from: &str, to: &str, cut: bool) {
-        let path = self.names().path(from, to);
+        let path = self.link_path(from, to);
         self.shared.with(|core| core.wire.set_cut(path, cut));
     }
 
-    fn names(&self) -> &Names {
+    /// Returns the path of a link.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host, or a NAT or a firewall is between the hosts.
+    fn link_path(&self, from: &str, to: &str) -> Path {
+        let path = self.names().path(from, to);
+        assert!(self.shared.with(|core| core.is_link(path)), "{}", no_link(self.names(), path));
+        path
+    }
+
+    pub(super) fn names(&self) -> &Names {
         self.shared.names()
     }
 }

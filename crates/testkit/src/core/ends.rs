@@ -6,7 +6,7 @@ use cohaptic_wan::{Path, flow_number};
 
 use super::bound::Port;
 use crate::address::Addresses;
-use crate::wire::HasFlow;
+use crate::wire::{Form, HasFlow};
 
 /// Returns the address of IPv4 as a socket of IPv6 shows it; an address of IPv6 as it is.
 pub(crate) fn mapped(address: SocketAddr) -> SocketAddr {
@@ -29,8 +29,8 @@ pub(crate) struct Ends {
     pub(super) from: u32,
     /// Address of the receiver, as [`Addresses::short`].
     pub(super) to: u32,
-    from_port: u16,
-    to_port: u16,
+    pub(super) from_port: u16,
+    pub(super) to_port: u16,
     /// `true` if both addresses are of IPv6.
     pub(super) is_six: bool,
     /// `true` if a socket of IPv6 has received the packet over IPv4, so that its program sees the addresses as `::ffff:10.0.0.1` (RFC 4291, section 2.5.5.2).
@@ -76,7 +76,6 @@ impl Ends {
 
     /// Returns the address of the receiver, as the receiving program sees it.
     #[inline]
-    #[cfg(any(test, feature = "quinn"))]
     pub(super) fn to(&self) -> SocketAddr {
         self.shown(SocketAddr::new(Addresses::long(self.to, self.is_six), self.to_port))
     }
@@ -110,6 +109,15 @@ impl HasFlow for Ends {
         let addresses = u64::from(self.from) << 32 | u64::from(self.to);
         let ports = u64::from(self.from_port) << 16 | u64::from(self.to_port);
         flow_number(&[addresses, (self.kind as u64) << 33 | u64::from(self.is_six) << 32 | ports])
+    }
+
+    fn form(&self) -> Form {
+        match self.kind {
+            Kind::Datagram => Form::Datagram([self.from(), self.to()]),
+            Kind::Unreachable => Form::Content,
+            #[cfg(feature = "tcp")]
+            Kind::Segment => Form::Packet,
+        }
     }
 }
 

@@ -7,6 +7,7 @@ mod ends;
 #[cfg(any(feature = "quinn", feature = "tcp"))]
 mod entropy;
 mod face;
+mod forwarding;
 #[cfg(feature = "facade")]
 mod holds;
 mod passing;
@@ -29,6 +30,7 @@ use cohaptic_wan::{LinkModel, NodeId, Path};
 use crate::address::{self, AddressPlan};
 use crate::current;
 use crate::link::LinkChange;
+use crate::middlebox::Topology;
 use crate::names::Names;
 use crate::settings::Settings;
 use crate::trace::Happening;
@@ -38,6 +40,8 @@ pub(crate) use bound::SocketId;
 use ends::{Ends, Kind};
 pub(crate) use ends::{mapped, unmapped};
 use face::Face;
+use forwarding::Forwarding;
+pub(crate) use forwarding::shown;
 use sockets::Sockets;
 use waking::Woken;
 
@@ -66,6 +70,8 @@ pub(crate) struct Core {
     #[cfg(feature = "facade")]
     unix: unix::Unix,
     pub(crate) woken: Woken,
+    /// NATs and firewalls; `None` without any.
+    forwarding: Option<Box<Forwarding>>,
     face: Arc<Face>,
     /// Number of the run whose state this is. 0 until [`Shared`] gives the number.
     run: u64,
@@ -81,8 +87,13 @@ impl Core {
         changes: Vec<LinkChange>,
         link: impl Fn(NodeId, NodeId) -> LinkModel + Send + Sync + 'static,
     ) -> Self {
+        let mut topology = Topology::new(names.len(), &settings.middleboxes);
+        let mut addresses = topology.addresses(&settings.middleboxes);
+        // An address that the test chooses comes before the address that a network gives.
+        addresses.extend(&settings.addresses);
         Self {
-            plan: AddressPlan::new(Arc::clone(names), &settings.addresses),
+            plan: AddressPlan::new(Arc::clone(names), &addresses),
+            forwarding: Forwarding::new(&settings.middleboxes, topology, names, seed),
             wire: Wire::new(names, seed, &settings, changes, link),
             face: Arc::new(Face::new(settings.patience)),
             settings,
@@ -101,6 +112,11 @@ impl Core {
         }
     }
 
+    /// Returns the number of hosts. NATs and firewalls have the last numbers, and do not count.
+    pub(crate) fn hosts(&self) -> usize {
+        self.hosts.len() - self.settings.middleboxes.len()
+    }
+
     /// Returns whether other threads read the state while a task runs: a record of the run, or the counters of laws.
     fn is_looked_at(&self) -> bool {
         self.settings.traces || self.settings.keeps_packets || self.settings.laws.iter().next().is_some()
@@ -114,6 +130,7 @@ impl Core {
     )]
     pub(crate) fn next_event(&mut self) -> Option<Instant> {
         let next = wire::earlier(self.wire.next(), self.timers.next());
+        let next = if self.forwarding.is_some() { wire::earlier(next, self.next_answer()) } else { next };
         #[cfg(feature = "tcp")]
         let next = self.with_tcp_timers(next);
         next
@@ -135,6 +152,10 @@ impl Core {
         }
         if self.wire.pass() {
             self.take_arrivals();
+        }
+        #[cfg(feature = "tcp")]
+        if self.forwarding.is_some() {
+            self.answer_unexpected();
         }
         #[cfg(feature = "tcp")]
         self.fire_tcp_timers();
@@ -186,8 +207,8 @@ impl Core {
 
     /// Returns the record of the run so far.
     pub(crate) fn recorded(&self) -> Recorded {
-        #[cfg_attr(not(any(feature = "quinn", feature = "tcp")), expect(unused_mut, reason = "nothing but links draws"))]
         let mut recorded = self.wire.recorded();
+        recorded.drawn.has_drawn |= self.forwarding.as_ref().is_some_and(|forwarding| forwarding.has_drawn());
         #[cfg(feature = "quinn")]
         let () = recorded.drawn.has_drawn |= self.entropy.was_asked();
         #[cfg(feature = "tcp")]
@@ -283,6 +304,7 @@ impl Core {
     /// Gives the host new addresses, and returns the new addresses.
     pub(crate) fn change_addresses(&mut self, host: NodeId) -> address::Addresses {
         self.wire.note(Happening::Readdressed(host));
-        self.plan.change(host)
+        let inside = self.forwarding.as_mut().and_then(|forwarding| forwarding.topology_mut().fresh(host));
+        self.plan.change(host, inside)
     }
 }

@@ -132,7 +132,7 @@ impl Core {
         if self.plan.owner_of(number, to.is_ipv6()).is_some() {
             return Ok(Route { from: self.source_to_host(socket, number, to)?, to: number, receivers: Receivers::One });
         }
-        let receivers = self.other_receivers(to, &mut number)?;
+        let receivers = self.other_receivers(socket.host, to, &mut number)?;
         let from = self.source(socket.host, socket.at, number, to)?;
         if matches!(receivers, Receivers::All) && !socket.may_broadcast {
             return Errno::PermissionDenied.fail();
@@ -152,7 +152,7 @@ impl Core {
 
     /// Returns the receivers of a datagram to an address that no host has. Sets `number` to the address on the packet, which differs for the
     /// unspecified address.
-    fn other_receivers(&self, to: &SocketAddr, number: &mut u32) -> io::Result<Receivers> {
+    fn other_receivers(&self, host: NodeId, to: &SocketAddr, number: &mut u32) -> io::Result<Receivers> {
         let ip = to.ip();
         if ip.is_multicast() {
             return Err(io::Error::new(
@@ -171,7 +171,7 @@ impl Core {
             return Ok(Receivers::All);
         }
         // The network of the hosts swallows a datagram to an address without a host, as a real network does. To other networks there is no route.
-        if self.plan.is_reachable(ip) { Ok(Receivers::Nobody) } else { Errno::NetworkUnreachable.fail() }
+        if self.is_reachable(host, ip) { Ok(Receivers::Nobody) } else { Errno::NetworkUnreachable.fail() }
     }
 
     /// Returns the source address of a socket that sends to the address `number`, given by the program as `to`. `at` is the address at which the socket is
@@ -212,6 +212,19 @@ impl Core {
     /// Hands a packet to its link, and delivers the packets that arrive at once.
     #[inline(always)]
     pub(super) fn offer(&mut self, path: Path, parcel: Box<Parcel>) {
+        if self.wire.is_watched() {
+            return self.offer_watched(path, parcel);
+        }
+        if self.wire.offer(path, parcel) == Ok(true) {
+            self.take_arrivals();
+        }
+    }
+
+    /// Like [`Core::offer`], in a run that may have NATs: the packet goes to the first node on the way. A packet to an address to which no way leads is lost
+    /// without an error, as in a real network.
+    #[inline(never)]
+    fn offer_watched(&mut self, path: Path, parcel: Box<Parcel>) {
+        let Some(path) = self.first_hop(path, &parcel.addresses) else { return self.spare.put(parcel) };
         if self.wire.offer(path, parcel) == Ok(true) {
             self.take_arrivals();
         }
@@ -247,6 +260,12 @@ impl Core {
         let end = if is_cut {
             self.wire.held.remove(Held::cost(parcel.bytes.len()));
             Err(Lost::Cut)
+        } else if self.is_middlebox(packet.path.to) {
+            match self.forward(parcel) {
+                // The packet has not ended: the trace has it again on the next link.
+                Ok(()) => return,
+                Err(why) => Err(why),
+            }
         } else {
             self.arrive(Path { to: self.receiver(packet.path), ..packet.path }, parcel)
         };

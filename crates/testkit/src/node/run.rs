@@ -22,7 +22,7 @@ use crate::record::Record;
 use crate::seed::Seed;
 use crate::setup::Setup;
 use crate::watch::{Kind, Watched};
-use crate::wire::{HasFlow, Wire};
+use crate::wire::{Form, HasFlow, Wire};
 
 /// Running nodes.
 ///
@@ -73,6 +73,11 @@ impl HasFlow for Ports {
         // Two hosts and two ports of 16 bits each fill the 64 bits of `ends`.
         let ends = [from.0, to.0, self.from, self.to].into_iter().fold(0, |ends, part| ends << 16 | u64::from(part));
         flow_number(&[ends, self.is_six.into()])
+    }
+
+    /// Packets of nodes are captured as contents.
+    fn form(&self) -> Form {
+        Form::Content
     }
 }
 

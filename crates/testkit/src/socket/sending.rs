@@ -9,6 +9,7 @@ use cohaptic_units::Ecn;
 
 use super::{KIND, UdpSocket};
 use crate::core::Outgoing;
+use crate::current;
 use crate::resolve::ToSocketAddrs;
 
 impl UdpSocket {
@@ -75,7 +76,8 @@ impl UdpSocket {
         if let Some(to) = to.as_socket_addr() {
             return self.send_now(Some(to), bytes, Ecn::NotCapable);
         }
-        match to.to_socket_addr() {
+        // Names mean what they mean to the host of the socket, also where another task sends.
+        match current::on_host(Some(self.host), || to.to_socket_addr()) {
             Ok(to) => self.send_now(Some(&to), bytes, Ecn::NotCapable),
             // A name cannot be looked up outside of the run. The error of a socket that may not be used is more useful than the error of the name.
             Err(error) => self.shared.check_open(self.host, KIND).and(Err(error)),

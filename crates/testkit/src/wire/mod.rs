@@ -21,7 +21,7 @@ pub(crate) use hitting::HitCount;
 use hitting::Hitting;
 #[cfg(feature = "tcp")]
 pub(crate) use parcel::Octets;
-pub(crate) use parcel::{Arrival, HasFlow, Parcel, Spare};
+pub(crate) use parcel::{Arrival, Form, HasFlow, Parcel, Spare};
 pub(crate) use recording::{Recorded, Recording, Seen};
 
 use crate::access::AccessStats;
@@ -51,8 +51,10 @@ pub(crate) struct Wire<A> {
     cut: BTreeSet<Path>,
     /// Bytes that the run holds, on links and at sockets and nodes.
     pub(crate) held: Held,
-    /// `true` if packets are hit by laws, recorded, or stopped by cuts.
+    /// `true` if packets are hit by laws, recorded, stopped by cuts, or pass NATs or firewalls.
     is_watched: bool,
+    /// `true` if packets may pass NATs or firewalls, so that each one is looked at.
+    is_routed: bool,
     /// State of the laws; `None` without laws.
     hitting: Option<Box<Hitting<A>>>,
     recording: Recording,
@@ -88,6 +90,7 @@ impl<A: HasFlow + Clone + Send + Sync + 'static> Wire<A> {
             cut: BTreeSet::new(),
             held: Held::new(settings.byte_limit),
             is_watched: false,
+            is_routed: !settings.middleboxes.is_empty(),
             recording,
             drawn: Drawn::default(),
             said: Arc::clone(&settings.said),
@@ -97,12 +100,13 @@ impl<A: HasFlow + Clone + Send + Sync + 'static> Wire<A> {
     }
 }
 
-impl<A: Clone> Wire<A> {
+impl<A: HasFlow + Clone> Wire<A> {
     pub(crate) const fn now(&self) -> Instant {
         self.now
     }
 
-    /// Returns whether packets are hit by laws, recorded, or stopped by cuts. If not, no arriving packet is cut, and the ends of packets are not recorded.
+    /// Returns whether packets are hit by laws, recorded, stopped by cuts, or pass NATs. If not, no arriving packet is cut, every packet goes from its sender to
+    /// its receiver over one link, and the ends of packets are not recorded.
     #[inline]
     pub(crate) const fn is_watched(&self) -> bool {
         self.is_watched
@@ -110,7 +114,7 @@ impl<A: Clone> Wire<A> {
 
     /// Notes whether packets must be looked at one by one.
     fn watch(&mut self) {
-        self.is_watched = self.hitting.is_some() || self.recording.is_on() || !self.cut.is_empty();
+        self.is_watched = self.is_routed || self.hitting.is_some() || self.recording.is_on() || !self.cut.is_empty();
     }
 
     /// Sets the time, which never goes back. Returns whether the time has moved.

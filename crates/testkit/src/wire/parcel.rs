@@ -1,5 +1,6 @@
 //! Packets of a run, in memory that is reused.
 
+use std::net::SocketAddr;
 use std::ops::Deref;
 #[cfg(feature = "tcp")]
 use std::sync::OnceLock;
@@ -32,6 +33,21 @@ pub(crate) struct Parcel<A> {
 pub(crate) trait HasFlow {
     /// Returns the number of the packet's flow on a path between two hosts.
     fn flow(&self, path: Path) -> u32;
+
+    /// Returns the form of the bytes of the packet.
+    fn form(&self) -> Form;
+}
+
+/// Form of the bytes of a packet, for captures.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Form {
+    /// IP packet with all headers.
+    #[cfg(feature = "tcp")]
+    Packet,
+    /// Content of a datagram of UDP, from the first address to the second.
+    Datagram([SocketAddr; 2]),
+    /// Content of a packet without known headers.
+    Content,
 }
 
 /// Report of a link about a delivered packet.
@@ -161,6 +177,18 @@ impl Octets {
     pub(crate) const fn segment(&self) -> Option<&Segment<'static>> {
         match &self.content {
             Content::Segment(whole) => Some(&whole.segment),
+            Content::Own(_) | Content::Shared(_) => None,
+        }
+    }
+
+    /// Returns the segment that the packet was sent as, for changes of its header. The packet is written anew for the next reader.
+    #[cfg(feature = "tcp")]
+    pub(crate) fn segment_mut(&mut self) -> Option<&mut Segment<'static>> {
+        match &mut self.content {
+            Content::Segment(whole) => {
+                whole.packet = OnceLock::new();
+                Some(&mut whole.segment)
+            }
             Content::Own(_) | Content::Shared(_) => None,
         }
     }

@@ -7,7 +7,7 @@ use cohaptic_units::Instant;
 use cohaptic_wan::{Fate, Network, PacketEvent, Path};
 
 use super::exits::{Exits, Out};
-use super::{HitCount, Parcel, Settings};
+use super::{Form, HasFlow, HitCount, Parcel, Settings};
 use crate::again::{Drawn, Said};
 use crate::names::Names;
 use crate::trace::{Happening, Trace};
@@ -24,8 +24,8 @@ pub(crate) struct Recording {
     keeps_packets: bool,
 }
 
-/// Fate of a packet on its link, with the content of the packet.
-pub(crate) type Seen = PacketEvent<Bytes, Path>;
+/// Fate of a packet on its link, with the content of the packet and the form of the content.
+pub(crate) type Seen = PacketEvent<(Bytes, Form), Path>;
 
 /// Copy of the record of a run.
 #[derive(Clone, Debug, Default)]
@@ -63,7 +63,7 @@ impl Recording {
     }
 
     #[inline]
-    pub(super) fn keep<A>(&mut self, event: &Out<A>) {
+    pub(super) fn keep<A: HasFlow>(&mut self, event: &Out<A>) {
         if self.keeps_packets {
             self.packets.push(seen(event));
         }
@@ -75,7 +75,7 @@ impl Recording {
     }
 
     /// Returns the recorded packets. Appends the ends of the packets that are still in `network` or in `exits`, from `now` on.
-    pub(super) fn followed_through<A: Clone>(&self, network: &Network<Box<Parcel<A>>>, mut exits: Exits<A>, mut now: Instant) -> Vec<Seen> {
+    pub(super) fn followed_through<A: HasFlow + Clone>(&self, network: &Network<Box<Parcel<A>>>, mut exits: Exits<A>, mut now: Instant) -> Vec<Seen> {
         let mut packets = self.packets.clone();
         if !self.keeps_packets {
             return packets;
@@ -103,6 +103,7 @@ impl Recording {
 }
 
 /// Converts an event of a link to a row of the packet log.
-fn seen<A>(out: &Out<A>) -> Seen {
-    PacketEvent { record: out.record, payload: out.payload.bytes.clone().into(), damage: out.damage.clone(), part: out.part }
+fn seen<A: HasFlow>(out: &Out<A>) -> Seen {
+    let payload = (out.payload.bytes.clone().into(), out.payload.addresses.form());
+    PacketEvent { record: out.record, payload, damage: out.damage.clone(), part: out.part }
 }

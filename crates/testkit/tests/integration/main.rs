@@ -24,6 +24,7 @@ mod link_files;
 mod loopback;
 mod many_hosts;
 mod misuse;
+mod nat;
 mod nodes;
 mod seeds;
 mod sockets;

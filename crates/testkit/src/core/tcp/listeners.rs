@@ -77,7 +77,7 @@ impl Core {
         let at = local.map(|local| local.ip()).filter(|ip| !ip.is_unspecified()).map(Addresses::short);
         let from = Addresses::long(self.source(host, at, Addresses::short(remote.ip()), &remote)?, remote.is_ipv6());
         let is_nobodys = !remote.ip().is_loopback() && self.plan.owner_node(remote.ip()).is_none();
-        if is_nobodys && !self.plan.is_reachable(remote.ip()) {
+        if is_nobodys && !self.is_reachable(host, remote.ip()) {
             return Errno::NetworkUnreachable.fail();
         }
         let port = match local {

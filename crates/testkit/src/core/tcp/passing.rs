@@ -78,8 +78,23 @@ impl Core {
         } else {
             // The segment is lost if the host has given the source address up, or if no host has the destination any more.
             let Some(receiver) = self.plan.owner_of(to, is_six).filter(|_| self.plan.short(host, is_six) == from) else { return };
-            Path { from: host, to: receiver }
+            let Some(path) = self.first_hop(Path { from: host, to: receiver }, &addresses) else { return };
+            path
         };
+        self.emit_on(path, addresses, connection, segment);
+    }
+
+    /// Sends a segment of a NAT or a firewall, which may have the address of a host inside as its source.
+    pub(in crate::core) fn emit_from(&mut self, node: NodeId, segment: Segment<'static>) {
+        let addresses = Ends::new(segment.source, segment.destination, Kind::Segment);
+        let owner = self.plan.owner_of(addresses.to, addresses.is_six);
+        if let Some(path) = owner.and_then(|owner| self.first_hop(Path { from: node, to: owner }, &addresses)) {
+            self.emit_on(path, addresses, None, segment);
+        }
+    }
+
+    /// Hands a segment to its link.
+    fn emit_on(&mut self, path: Path, addresses: Ends, connection: Option<ConnId>, segment: Segment<'static>) {
         // The entry is made before the offer, which takes the segment, and noted after the offer, so that the trace has the sending first.
         let happening = self.wire.recording().traces.then(|| self.described(self.wire.next_packet(path), connection, &segment));
         let parcel = self.spare.wrapped(addresses, segment);

@@ -207,3 +207,42 @@ proptest! {
         prop_assert!(answered(Testbed::new(["client", "server"]).hits(&hits)) <= 420);
     }
 }
+
+#[test]
+fn a_call_ends_when_the_nat_forgets_it() {
+    let bed = Testbed::new(["laptop", "server"]).nat("router", "home udp-timeout 60s", ["laptop"]).links("delay 10ms");
+    bed.run(|bed| async move {
+        let server = bed.host("server").bind("0.0.0.0:7").unwrap();
+        let laptop = bed.host("laptop").bind("0.0.0.0:5000").unwrap();
+        laptop.send_to(b"call me", "server:7").await.unwrap();
+        let (_, from) = server.recv_from(&mut [0; 7]).await.unwrap();
+        assert_eq!(from.to_string(), "10.0.0.3:5000");
+        let mappings: Vec<String> = bed.nat("router").mappings().iter().map(ToString::to_string).collect();
+        assert_eq!(mappings, ["UDP 192.168.1.1:5000 is 10.0.0.3:5000 for 10.0.0.2:7"]);
+
+        // Calls from outside do not keep the mapping.
+        let rings = async || {
+            server.send_to(b"ring", from).await.unwrap();
+            time::timeout(Duration::from_secs(1), laptop.recv(&mut [0; 4])).await.is_ok()
+        };
+        assert!(rings().await);
+        time::sleep(Duration::from_secs(50)).await;
+        assert!(rings().await);
+        time::sleep(Duration::from_secs(10)).await;
+        assert!(!rings().await);
+        assert_eq!(bed.nat("router").filtered(), 1);
+    });
+}
+
+#[test]
+fn the_words_of_a_file_with_nats_are_read() {
+    let text = "nat home-a: alice\n\
+                nat home-b strict udp-timeout 30s: bob\n\
+                firewall office: carol\n\
+                all: delay 20ms\n\
+                alice -> home-a: delay 2ms\n\
+                home-a -> home-b: delay 20ms loss 1%\n";
+    let file = cohaptic_testkit::LinkFile::parse(text).unwrap();
+    assert_eq!(file.hosts(), ["alice", "bob", "carol"]);
+    super::assert_shown(text);
+}
