@@ -24,6 +24,9 @@ pub struct AddressPlan {
     owners: Vec<[Option<NodeId>; 2]>,
     /// Hosts with addresses chosen by the test, by version of IP (true for 6) and short form. Few or none, and looked at after `owners`.
     chosen: BTreeMap<(bool, u32), NodeId>,
+    /// Nodes of the interfaces of hosts with several. The addresses of such a host in `current` are those of its uplink, and the host is the owner of the
+    /// addresses of all its interfaces.
+    interfaces: BTreeMap<NodeId, Vec<NodeId>>,
 }
 
 /// Addresses of one host.
@@ -90,6 +93,12 @@ impl Addresses {
         bits == u32::MAX || bits == FIRST.0 | 0x00ff_ffff
     }
 
+    /// Returns whether `short` is a multicast address of IPv4 (RFC 1112): 224.0.0.0/4. Groups of IPv6 have no short form.
+    #[inline]
+    pub(crate) const fn is_multicast(short: u32) -> bool {
+        short.wrapping_add(FIRST.0) >> 28 == 0b1110
+    }
+
     /// Returns whether the address belongs to the network of the hosts: 10.0.0.0/8 or `fd00::/8`. Nobody answers at such an address without a host. Other
     /// networks cannot be reached.
     pub(crate) const fn is_of_network(address: IpAddr) -> bool {
@@ -137,7 +146,7 @@ impl AddressPlan {
     /// Creates the plan. `chosen` holds the addresses chosen by the test in short form, by host and version of IP (true for 6).
     pub(crate) fn new(names: Arc<Names>, chosen: &BTreeMap<(NodeId, bool), u32>) -> Self {
         let taken = chosen.iter().map(|((host, is_six), short)| ((*is_six, *short), *host)).collect();
-        let mut plan = Self { current: Vec::with_capacity(names.len()), names, owners: Vec::new(), chosen: taken };
+        let mut plan = Self { current: Vec::with_capacity(names.len()), names, owners: Vec::new(), chosen: taken, interfaces: BTreeMap::new() };
         for host in (0..plan.names.len()).map(NodeId::new) {
             let number = plan.fresh(host);
             plan.current.push([number; 2]);
@@ -169,10 +178,51 @@ impl AddressPlan {
         self.owners.iter_mut().skip(Self::place(number)).take(1).for_each(|owner| owner[version] = None);
     }
 
+    /// Gives a host the addresses of these nodes. The first node is the uplink.
+    pub(crate) fn add_interfaces(&mut self, host: NodeId, nodes: &[NodeId]) {
+        for (version, short) in self.current[host.index()].into_iter().enumerate() {
+            self.let_go(version, short);
+        }
+        let owned = self.owners.iter_mut().flatten().flatten().chain(self.chosen.values_mut());
+        owned.filter(|owner| nodes.contains(owner)).for_each(|owner| *owner = host);
+        self.interfaces.insert(host, nodes.to_vec());
+        self.set_uplink(host, nodes[0]);
+    }
+
+    /// Gives a host the addresses of one of its interfaces as its usual ones.
+    pub(crate) fn set_uplink(&mut self, host: NodeId, node: NodeId) {
+        self.current[host.index()] = self.current[node.index()];
+    }
+
+    /// Returns the node with the usual addresses of a host: the host itself, or its uplink.
+    pub(crate) fn uplink(&self, host: NodeId) -> NodeId {
+        self.nodes_of(host).iter().copied().find(|node| self.current[node.index()] == self.current[host.index()]).unwrap_or(host)
+    }
+
+    /// Returns the interfaces of a host with several; empty for other hosts.
+    pub(crate) fn nodes_of(&self, host: NodeId) -> &[NodeId] {
+        self.interfaces.get(&host).map_or(&[], Vec::as_slice)
+    }
+
+    /// Returns the host of a node, which is the node itself unless the node is an interface.
+    pub(crate) fn host_of(&self, node: NodeId) -> NodeId {
+        self.interfaces.iter().find(|(_, nodes)| nodes.contains(&node)).map_or(node, |(host, _)| *host)
+    }
+
+    /// Returns the node by which a host has the address of the short form `short`: the host itself, or one of its interfaces. `None` if no interface has the
+    /// address.
+    pub(crate) fn node_at(&self, host: NodeId, short: u32, is_six: bool) -> Option<NodeId> {
+        match self.nodes_of(host) {
+            [] => Some(host),
+            nodes => nodes.iter().copied().find(|node| self.short(*node, is_six) == short),
+        }
+    }
+
     /// Gives a host addresses that no host has had. The former addresses belong to no host from now on. `inside` is the address of IPv4 of a host behind a
     /// NAT, in short form.
     pub(crate) fn change(&mut self, host: NodeId, inside: Option<u32>) -> Addresses {
-        let before = self.current[host.index()];
+        let node = self.uplink(host);
+        let before = self.current[node.index()];
         for (version, short) in before.into_iter().enumerate() {
             // The key stays if the address was chosen, so that the address is not given in turn.
             if self.chosen.get(&(version == 1, short)) != Some(&host) {
@@ -180,12 +230,13 @@ impl AddressPlan {
             }
         }
         let number = self.fresh(host);
-        self.current[host.index()] = [number; 2];
+        self.current[node.index()] = [number; 2];
         if let Some(inside) = inside {
             self.let_go(0, number);
             self.chosen.insert((false, inside), host);
-            self.current[host.index()][0] = inside;
+            self.current[node.index()][0] = inside;
         }
+        self.set_uplink(host, node);
         self.of(host)
     }
 
@@ -230,7 +281,7 @@ impl AddressPlan {
     /// Returns the host with an address chosen by the test.
     #[cold]
     fn chooser_of(&self, short: u32, is_six: bool) -> Option<NodeId> {
-        self.chosen.get(&(is_six, short)).copied().filter(|host| self.short(*host, is_six) == short)
+        self.chosen.get(&(is_six, short)).copied().filter(|host| self.has(*host, short, is_six))
     }
 
     /// Returns whether packets can be sent to the address, even to an address of no host: the address belongs to the network of the hosts, or the test has
@@ -255,7 +306,18 @@ impl AddressPlan {
     /// Returns whether the address with the short form `short` is an address of the host, loopback included.
     #[inline]
     pub(crate) fn is_own(&self, host: NodeId, short: u32, is_six: bool) -> bool {
-        self.short(host, is_six) == short || Addresses::is_loopback(short, is_six)
+        self.short(host, is_six) == short || Addresses::is_loopback(short, is_six) || self.is_of_interface(host, short, is_six)
+    }
+
+    /// Returns whether the host has the address, loopback excluded.
+    pub(crate) fn has(&self, host: NodeId, short: u32, is_six: bool) -> bool {
+        self.short(host, is_six) == short || self.is_of_interface(host, short, is_six)
+    }
+
+    /// Returns whether one of several interfaces of the host has the address.
+    #[cold]
+    pub(crate) fn is_of_interface(&self, host: NodeId, short: u32, is_six: bool) -> bool {
+        self.nodes_of(host).iter().any(|node| self.short(*node, is_six) == short)
     }
 
     #[inline]

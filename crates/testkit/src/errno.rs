@@ -16,6 +16,8 @@ pub(crate) enum Errno {
     BrokenPipe,
     /// `EACCES`.
     PermissionDenied,
+    /// `ENODEV`.
+    NoDevice,
     /// `EINVAL`.
     InvalidInput,
     /// `EDESTADDRREQ`.
@@ -53,6 +55,7 @@ impl Errno {
             Self::NoEntry => 2,
             Self::TryAgain => 11,
             Self::PermissionDenied => 13,
+            Self::NoDevice => 19,
             Self::InvalidInput => 22,
             Self::BrokenPipe => 32,
             Self::NoDestination => 89,
@@ -77,6 +80,7 @@ impl Errno {
             Self::NotPermitted => 1,
             Self::NoEntry => 2,
             Self::PermissionDenied => 13,
+            Self::NoDevice => 19,
             Self::InvalidInput => 22,
             Self::BrokenPipe => 32,
             Self::TryAgain => 35,
@@ -100,6 +104,8 @@ impl Errno {
     const fn number(self) -> i32 {
         match self {
             Self::NoEntry => 2,
+            // Windows answers an unknown interface as an address that is not available.
+            Self::NoDevice => 10_049,
             Self::NotPermitted => 5,
             Self::BrokenPipe => 109,
             Self::TryAgain => 10_035,

@@ -49,6 +49,12 @@ impl Host {
         IpAddr::from(self.addresses().v4)
     }
 
+    /// Returns whether the host has the address, by any of its interfaces.
+    #[cfg(feature = "quinn")]
+    pub(crate) fn has_address(&self, address: IpAddr) -> bool {
+        self.shared.with(|core| core.plan.has(self.node, Addresses::short(address), address.is_ipv6()))
+    }
+
     #[cfg(feature = "quinn")]
     pub(crate) const fn node(&self) -> NodeId {
         self.node
@@ -210,6 +216,23 @@ impl Host {
     /// more.
     pub fn change_addresses(&self) -> Addresses {
         self.shared.with(|core| core.change_addresses(self.node))
+    }
+
+    /// Makes one of the interfaces of [`Testbed::interfaces`](crate::Testbed::interfaces) the uplink of the host, like a phone that leaves the reach of a
+    /// wireless network. Returns the addresses that the host has from now on. As with [`Host::change_addresses`], sockets bound to `0.0.0.0` or `[::]` go on
+    /// with the new addresses. The former interface stays: sockets bound to its address, and connections of TCP from there, still use it, unless its links are
+    /// cut.
+    ///
+    /// # Panics
+    ///
+    /// If the host has no such interface.
+    #[expect(clippy::panic, reason = "a misuse, and the way out")]
+    pub fn uplink(&self, interface: &str) -> Addresses {
+        let addresses = self.shared.with(|core| {
+            let node = self.shared.names().find(interface).filter(|node| core.plan.nodes_of(self.node).contains(node))?;
+            Some(core.set_uplink(self.node, node))
+        });
+        addresses.unwrap_or_else(|| panic!("host `{}` has no interface `{interface}`; `Testbed::interfaces` gives a host interfaces", self.name()))
     }
 
     /// Returns the run of this host.

@@ -47,6 +47,7 @@
 //! | what a link is: words of `tc-netem`, or a model of the emulator | [`ToLink`], [`wan`] |
 #![cfg_attr(feature = "files", doc = "| links with a name, such as `starlink`, and hosts behind one | [`LibraryLink`], [`Testbed::access`] |")]
 #![cfg_attr(not(feature = "files"), doc = "| links with a name, such as `starlink`, and hosts behind one | feature `files` |")]
+//! | NATs and firewalls, hosts with several networks | [`Testbed::nat`], [`Testbed::firewall`], [`Testbed::interfaces`], [`Nat`] |
 //! | single packets that are dropped, delayed, copied, damaged or held back | [`hit`], [`Testbed::on_packet`], [`Testbed::hit`](Testbed::hit()) |
 //! | programs without sockets: state machines | [`node`] |
 #![cfg_attr(feature = "strategies", doc = "| links and networks at random, which shrink to the least impaired | [`strategies`] |")]

@@ -1,4 +1,4 @@
-//! NATs and firewalls of a test bed: which host is behind which one, the addresses inside, and the next hop of a packet.
+//! NATs, firewalls and interfaces of a test bed: the hosts behind each NAT, the addresses inside, and the next hop of a packet.
 
 use std::collections::BTreeMap;
 use std::net::Ipv4Addr;
@@ -9,18 +9,40 @@ use crate::address::Addresses;
 use crate::names::Names;
 use crate::nat::Behaviour;
 
-/// NAT or firewall as the test gave it. A NAT or firewall is a node of the network without programs.
+/// NAT or firewall, a node of the network without programs.
 #[derive(Clone, Debug)]
 pub(crate) struct Middlebox {
     pub(crate) node: NodeId,
     pub(crate) behaviour: Behaviour,
-    /// `true` for a NAT, which translates IPv4; `false` for a firewall.
+    /// `true` for a NAT, with translation of IPv4; `false` for a firewall.
     pub(crate) translates: bool,
-    /// Hosts, NATs and firewalls directly behind, in the order of their addresses.
+    /// Hosts, NATs and firewalls directly behind, in the order of addresses.
     pub(crate) inside: Vec<NodeId>,
 }
 
-/// Most NATs of a test bed, and most addresses given behind one NAT, because the third and the fourth number of an address are those of NAT and host.
+/// Interfaces of a host with several. An interface is a node of the network with addresses and links of its own; the host itself has no links.
+#[derive(Clone, Debug)]
+pub(crate) struct Interfaces {
+    pub(crate) host: NodeId,
+    /// Nodes of the interfaces. The first is the uplink at the beginning.
+    pub(crate) nodes: Vec<NodeId>,
+}
+
+impl Interfaces {
+    /// Returns the line of a link file for the interfaces.
+    pub(crate) fn line(&self, names: &Names) -> String {
+        let nodes: Vec<&str> = self.nodes.iter().map(|node| &*names[node.index()]).collect();
+        format!("interfaces {}: {}", names[self.host.index()], nodes.join(" "))
+    }
+
+    /// Returns the call of the builder for the interfaces.
+    pub(crate) fn call(&self, names: &Names) -> String {
+        let nodes: Vec<String> = self.nodes.iter().map(|node| format!("{:?}", names[node.index()])).collect();
+        format!(".interfaces({:?}, [{}])", names[self.host.index()], nodes.join(", "))
+    }
+}
+
+/// Most NATs of a test bed, and most addresses behind a NAT, because the third number of an address counts the NATs and the fourth the hosts.
 const MOST: usize = 254;
 
 impl Middlebox {
@@ -66,14 +88,14 @@ pub(crate) fn check_size(before: usize, translates: bool, inside: usize) -> Resu
 pub(crate) struct Topology {
     /// Node directly above, indexed by node; `None` for the hosts of the outermost network.
     parents: Vec<Option<NodeId>>,
-    /// NAT whose network a node is in, indexed by node. A firewall has no network of its own.
+    /// NAT around the network of a node, indexed by node. A firewall has no network of its own.
     networks: Vec<Option<NodeId>>,
     /// First three numbers of the addresses behind a NAT, and the number given last.
     given: BTreeMap<NodeId, ([u8; 3], u8)>,
 }
 
 impl Topology {
-    /// Creates the tree of `nodes` nodes. A NAT or firewall stands in `boxes` after all that are behind it.
+    /// Creates the tree of `nodes` nodes. A NAT or firewall stands in `boxes` after all nodes behind.
     pub(crate) fn new(nodes: usize, boxes: &[Middlebox]) -> Self {
         let mut tree = Self { parents: vec![None; nodes], networks: vec![None; nodes], given: BTreeMap::new() };
         for Middlebox { node, inside, .. } in boxes {
@@ -91,15 +113,15 @@ impl Topology {
         tree
     }
 
-    /// Returns the addresses of all nodes behind NATs, in short form. The nodes of a network have the numbers from 1 on, in the order in which the test named them,
-    /// and those behind a firewall come before their firewall.
+    /// Returns the addresses of all nodes behind NATs, in short form. The nodes of a network have the numbers from 1 on, in the order of the test, and
+    /// nodes behind a firewall come before the firewall.
     pub(crate) fn addresses(&mut self, boxes: &[Middlebox]) -> BTreeMap<(NodeId, bool), u32> {
         let mut order = Vec::new();
         boxes.iter().filter(|middlebox| middlebox.translates).for_each(|nat| list(nat, boxes, &mut order));
         order.into_iter().filter_map(|node| Some(((node, false), self.fresh(node)?))).collect()
     }
 
-    /// Returns an address of IPv4 that no node has had, in the network of `node`, in short form. `None` for a node of the outermost network, and if all
+    /// Returns a new address of IPv4 in the network of `node`, in short form. `None` for a node of the outermost network, and if all
     /// addresses of the network were given.
     pub(crate) fn fresh(&mut self, node: NodeId) -> Option<u32> {
         let ([one, two, three], last) = self.given.get_mut(&self.networks[node.index()]?)?;
@@ -122,13 +144,13 @@ impl Topology {
         self.networks[node.index()].is_some()
     }
 
-    /// Returns the NAT whose network `to` is in, if that network does not contain `from`, so that neither name nor address of `to` means anything there. A NAT
-    /// itself is in the network behind it as well.
+    /// Returns the NAT around the network of `to` if that network does not contain `from`: neither name nor address of `to` means anything there. A NAT belongs
+    /// to the network behind as well.
     pub(crate) fn hides(&self, from: NodeId, to: NodeId) -> Option<NodeId> {
         self.networks[to.index()].filter(|network| self.line(from).all(|above| above != *network))
     }
 
-    /// Returns whether there is a link between two nodes: one is directly above the other, or both are in one network.
+    /// Returns whether there is a link between two nodes: either node is directly above, or both nodes are in the same network.
     pub(crate) fn is_link(&self, one: NodeId, other: NodeId) -> bool {
         let [above_one, above_other] = [one, other].map(|node| self.parent(node));
         above_one == above_other || above_one == Some(other) || above_other == Some(one)
@@ -145,7 +167,7 @@ impl Topology {
     }
 }
 
-/// Lists the nodes in the network of a NAT: those directly behind, and those behind firewalls.
+/// Lists the nodes in the network of a NAT, nodes behind firewalls included.
 fn list(middlebox: &Middlebox, boxes: &[Middlebox], order: &mut Vec<NodeId>) {
     for node in &middlebox.inside {
         if let Some(firewall) = boxes.iter().find(|other| other.node == *node && !other.translates) {

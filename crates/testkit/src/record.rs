@@ -68,9 +68,15 @@ impl Record {
         self.recorded.said.lines(self.recorded.trace.hosts())
     }
 
-    /// Returns the line of a link file for each NAT and firewall. NATs and firewalls are the last names of the trace.
-    pub(crate) fn middleboxes(&self) -> impl Iterator<Item = &str> {
-        self.recorded.said.middleboxes().map(|(line, _)| line)
+    /// Returns the line of a link file for each NAT and firewall, and for the interfaces of each host.
+    pub(crate) fn devices(&self) -> impl Iterator<Item = &str> {
+        self.recorded.said.devices().map(|(line, _)| line)
+    }
+
+    /// Returns the names of the hosts. NATs, firewalls and interfaces have further names in the trace.
+    pub(crate) fn hosts(&self) -> &[String] {
+        let names = self.recorded.trace.hosts();
+        &names[..names.len() - self.recorded.devices]
     }
 
     pub(crate) fn packets_of(&self, path: Path) -> impl Iterator<Item = &Seen> {

@@ -10,7 +10,7 @@ use cohaptic_wan::{NodeId, Path};
 use crate::access::AccessLines;
 use crate::again::Said;
 use crate::hit::Laws;
-use crate::middlebox::Middlebox;
+use crate::middlebox::{Interfaces, Middlebox};
 
 /// Settings of a run.
 #[derive(Clone, Debug)]
@@ -41,8 +41,17 @@ pub(crate) struct Settings {
     pub(crate) access: BTreeMap<NodeId, AccessLines>,
     /// NATs and firewalls. Each stands after all that are behind it.
     pub(crate) middleboxes: Vec<Middlebox>,
+    /// Hosts with several interfaces.
+    pub(crate) interfaces: Vec<Interfaces>,
     /// Link for packets of the sender to itself; `None` if such packets arrive at once. The receiver of the link is a host without programs.
     pub(crate) loopback: Option<Path>,
+}
+
+impl Settings {
+    /// Returns the number of nodes that are no hosts: NATs, firewalls and interfaces.
+    pub(crate) fn devices(&self) -> usize {
+        self.middleboxes.len() + self.interfaces.iter().map(|interfaces| interfaces.nodes.len()).sum::<usize>()
+    }
 }
 
 /// Limits of a run, beyond which the run fails.

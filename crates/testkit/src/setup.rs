@@ -11,7 +11,7 @@ use cohaptic_wan::{LinkModel, NodeId, Path};
 use crate::file::LinkFile;
 use crate::hit::{Laws, PacketLaw, PathHit, SentPacket, Verdict};
 use crate::link::{LinkChange, ToLink};
-use crate::middlebox::{Middlebox, Topology, check_size};
+use crate::middlebox::{Interfaces, Middlebox, Topology, check_size};
 use crate::names::Names;
 use crate::nat::Behaviour;
 use crate::settings::{Limits, Settings};
@@ -67,6 +67,7 @@ impl Setup {
                 laws: Laws::default(),
                 access: BTreeMap::new(),
                 middleboxes: Vec::new(),
+                interfaces: Vec::new(),
                 loopback: None,
             },
             artefacts: None,
@@ -79,9 +80,38 @@ impl Setup {
         Arc::make_mut(&mut self.names).add(name.to_owned());
     }
 
-    /// Returns the number of hosts. NATs and firewalls have the last names, and do not count.
+    /// Returns the number of hosts. NATs, firewalls and interfaces have the last names, and do not count.
     pub(crate) fn hosts(&self) -> usize {
-        self.names.len() - self.settings.middleboxes.len()
+        self.names.len() - self.settings.devices()
+    }
+
+    /// Gives a host interfaces of these names, each a node with links of its own.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host, the host has interfaces already or is behind a NAT, or another host has one of the names.
+    #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
+    pub(crate) fn add_interfaces(&mut self, host: &str, interfaces: &[&str]) {
+        let node = self.names.node(host);
+        assert!(!interfaces.is_empty(), "host `{host}` gets no interfaces: give at least one name");
+        if let Err(fault) = self.check_single(node) {
+            panic!("host `{host}` cannot get interfaces: {fault}");
+        }
+        let first = self.names.len();
+        interfaces.iter().for_each(|interface| self.add(interface));
+        let interfaces = Interfaces { host: node, nodes: (first..self.names.len()).map(NodeId::new).collect() };
+        Arc::make_mut(&mut self.settings.said).add_device(interfaces.line(&self.names), interfaces.call(&self.names));
+        self.settings.interfaces.push(interfaces);
+    }
+
+    /// Checks that a node is a host with links of its own.
+    fn check_single(&self, node: NodeId) -> Result<(), String> {
+        let Settings { middleboxes, interfaces, .. } = &self.settings;
+        if interfaces.iter().any(|other| other.host == node || other.nodes.contains(&node)) {
+            return Err("it has interfaces, or is one".to_owned());
+        }
+        let other = middleboxes.iter().find(|middlebox| middlebox.node == node || middlebox.inside.contains(&node));
+        other.map_or(Ok(()), |other| Err(format!("it is `{}` or behind it; put its interfaces there", self.names[other.node.index()])))
     }
 
     /// Adds a NAT, or a firewall if `translates` is false, with the hosts named `inside` behind.
@@ -98,13 +128,16 @@ impl Setup {
         for (place, node) in inside.iter().enumerate() {
             let host = &self.names[node.index()];
             assert!(!inside[..place].contains(node), "host `{host}` is named twice behind `{name}`: name it once");
+            if self.settings.interfaces.iter().any(|interfaces| interfaces.host == *node) {
+                panic!("host `{host}` has interfaces, and cannot be behind `{name}` itself: name its interfaces");
+            }
             if let Some(other) = self.settings.middleboxes.iter().find(|middlebox| middlebox.inside.contains(node)) {
                 panic!("host `{host}` is behind `{}` already, and cannot be behind `{name}` as well", self.names[other.node.index()]);
             }
         }
         self.add(name);
         let middlebox = Middlebox { node: NodeId::new(self.names.len() - 1), behaviour, translates, inside };
-        Arc::make_mut(&mut self.settings.said).add_middlebox(middlebox.line(&self.names), middlebox.call(&self.names));
+        Arc::make_mut(&mut self.settings.said).add_device(middlebox.line(&self.names), middlebox.call(&self.names));
         self.settings.middleboxes.push(middlebox);
     }
 
@@ -114,13 +147,22 @@ impl Setup {
     ///
     /// If a link is named that does not exist.
     pub(crate) fn check_links(&self) {
-        if self.settings.middleboxes.is_empty() {
+        if self.settings.devices() == 0 {
             return;
         }
+        let has_interfaces = |node: NodeId| self.settings.interfaces.iter().any(|interfaces| interfaces.host == node);
         let topology = Topology::new(self.names.len(), &self.settings.middleboxes);
         let changed = self.changes.iter().map(|change| Path { from: NodeId::new(change.from), to: NodeId::new(change.to) });
         for path in self.links.keys().copied().chain(changed).chain(self.settings.laws.iter().map(|law| law.path)) {
-            assert!(topology.is_link(path.from, path.to), "{}", no_link(&self.names, path));
+            let is_link = topology.is_link(path.from, path.to) && ![path.from, path.to].into_iter().any(has_interfaces);
+            assert!(is_link, "{}", no_link(&self.names, path));
+        }
+        for Interfaces { host, .. } in &self.settings.interfaces {
+            let name = &self.names[host.index()];
+            assert!(
+                !self.settings.access.contains_key(host),
+                "host `{name}` cannot have access lines, because it has no links: give them to its interfaces"
+            );
         }
         for Middlebox { node, .. } in &self.settings.middleboxes {
             assert!(
@@ -173,11 +215,11 @@ impl Setup {
 
     /// Sets all links, their changes, the access lines, the hits and the seed as a file says. The setup must have the hosts of the file.
     pub(crate) fn read(&mut self, file: LinkFile) {
-        let LinkFile { hosts, middleboxes, every, links, changes, access, hits, seed } = file;
+        let LinkFile { hosts, devices, every, links, changes, access, hits, seed } = file;
         // Packets of state machines have no addresses that a NAT could translate.
         assert!(
-            self.noun == "host" || middleboxes.is_empty(),
-            "the file has NATs or firewalls, which pass packets of sockets alone: expected links only"
+            self.noun == "host" || devices.is_empty(),
+            "the file has NATs, firewalls or interfaces, which are of sockets alone: expected links only"
         );
         // The setup may have the hosts of the file in another order, so the indices of the file are translated.
         let nodes: Vec<NodeId> = hosts.iter().map(|host| self.names.node(host)).collect();
@@ -243,10 +285,10 @@ impl Setup {
     }
 }
 
-/// Returns the message that there is no link between two hosts because of a NAT.
+/// Returns the message that there is no link between two hosts because of a NAT or an interface.
 pub(crate) fn no_link(names: &Names, Path { from, to }: Path) -> String {
     let [from, to] = [from, to].map(|node| &names[node.index()]);
-    format!("`{from}` has no link to `{to}`, because a NAT or a firewall is between them: name the links on the way")
+    format!("`{from}` has no link to `{to}`, because a NAT, a firewall or an interface is between them: name the links on the way")
 }
 
 /// Returns the name of a law without words: the place where the test gave the law.

@@ -100,6 +100,10 @@ pub enum Happening {
     Cut(Path),
     /// The cut of a path has ended.
     Mended(Path),
+    /// The path from a host to another host was put on hold.
+    Held(Path),
+    /// The hold of a path has ended, and the packets that have waited arrive.
+    Released(Path),
     /// The link from a host to another host was replaced.
     Relinked(Path),
     /// The program added a note: see [`Bed::note`](crate::Bed::note).
@@ -347,6 +351,14 @@ impl fmt::Display for Words<'_> {
             Happening::Mended(path) => {
                 self.path(f, *path)?;
                 f.write_str(" mended")
+            }
+            Happening::Held(path) => {
+                self.path(f, *path)?;
+                f.write_str(" on hold")
+            }
+            Happening::Released(path) => {
+                self.path(f, *path)?;
+                f.write_str(" released")
             }
             Happening::Relinked(path) => {
                 self.path(f, *path)?;

@@ -22,6 +22,8 @@ use crate::trace::PacketName;
 #[derive(Clone, Debug)]
 pub(crate) struct Again {
     pub(crate) names: Arc<Names>,
+    /// Number of hosts. Further names are those of NATs, firewalls and interfaces.
+    pub(crate) hosts: usize,
     pub(crate) said: Arc<Said>,
     pub(crate) laws: Laws,
     pub(crate) seed: Seed,
@@ -70,11 +72,10 @@ impl Again {
         if !has_failed {
             text.push_str("let outcome = ");
         }
-        // NATs and firewalls are the last names, and have calls of their own.
-        let middleboxes: Vec<&str> = self.said.middleboxes().map(|(_, call)| call).collect();
-        let hosts = &self.names[..self.names.len() - middleboxes.len()];
+        let devices: Vec<&str> = self.said.devices().map(|(_, call)| call).collect();
+        let hosts = &self.names[..self.hosts];
         let _ = write!(text, "Testbed::new([{}])", hosts.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", "));
-        for line in middleboxes.into_iter().map(str::to_owned).chain(self.network(drawn)) {
+        for line in devices.into_iter().map(str::to_owned).chain(self.network(drawn)) {
             let _ = write!(text, "\n        {line}");
         }
         for line in &self.others {

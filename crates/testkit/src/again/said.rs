@@ -14,8 +14,8 @@ pub(crate) struct Said {
     links: BTreeMap<Path, Words>,
     /// Names of the links of the library that are the access lines of hosts.
     access: BTreeMap<NodeId, Words>,
-    /// Line of a link file and call of the builder for each NAT and firewall.
-    middleboxes: Vec<(String, String)>,
+    /// Line of a link file and call of the builder for each NAT and firewall, and for the interfaces of each host.
+    devices: Vec<(String, String)>,
 }
 
 /// Link in the words of `tc-netem`, where an empty text is the ideal link; or a link without words.
@@ -105,14 +105,14 @@ impl Said {
         self.access.clear();
     }
 
-    /// Adds a NAT or a firewall: its line of a link file, and its call of the builder.
-    pub(crate) fn add_middlebox(&mut self, line: String, call: String) {
-        self.middleboxes.push((line, call));
+    /// Adds a NAT, a firewall, or the interfaces of a host: the line of a link file, and the call of the builder.
+    pub(crate) fn add_device(&mut self, line: String, call: String) {
+        self.devices.push((line, call));
     }
 
-    /// Returns the line of a link file and the call of the builder for each NAT and firewall.
-    pub(crate) fn middleboxes(&self) -> impl Iterator<Item = (&str, &str)> {
-        self.middleboxes.iter().map(|(line, call)| (&**line, &**call))
+    /// Returns the line of a link file and the call of the builder for each NAT and firewall, and for the interfaces of each host.
+    pub(crate) fn devices(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.devices.iter().map(|(line, call)| (&**line, &**call))
     }
 
     pub(super) const fn every(&self) -> &Words {
@@ -129,7 +129,7 @@ impl Said {
         self.access.iter().map(|(host, words)| (*host, words))
     }
 
-    /// Returns a line for each NAT and firewall, for each link that is not ideal, for all links that are not named, and for the access lines of each host.
+    /// Returns a line for each device, for each link that is not ideal, for all links that are not named, and for the access lines of each host.
     pub(crate) fn lines(&self, hosts: &[String]) -> Vec<String> {
         let name = |host: NodeId| hosts.get(host.index()).map_or("?", |name| name);
         let links = self.links().map(|(path, words)| {
@@ -138,8 +138,8 @@ impl Said {
         });
         let every = (self.every != Words::default()).then(|| format!("all: {}", self.every.shown()));
         let access = self.access().map(|(host, words)| format!("access of {}: {}", name(host), words.shown()));
-        let middleboxes = self.middleboxes().map(|(line, _)| line.to_owned());
-        middleboxes.chain(every).chain(links).chain(access).collect()
+        let devices = self.devices().map(|(line, _)| line.to_owned());
+        devices.chain(every).chain(links).chain(access).collect()
     }
 }
 

@@ -55,9 +55,9 @@ pub(super) fn files(record: &Record) -> Vec<(String, Vec<u8>)> {
     );
     let asked: String = record.network().iter().map(|line| format!("# {line}\n")).collect();
     let asked = if asked.is_empty() { asked } else { format!("# The links of the test:\n{asked}") };
-    let boxes: String = record.middleboxes().map(|line| format!("{line}\n")).collect();
-    let hosts = hosts[..hosts.len() - record.middleboxes().count()].join(" ");
-    let links = format!("# The fate of each packet, link by link.\n{asked}seed: {}\nhosts: {hosts}\n{boxes}{links}", seed.value);
+    let devices: String = record.devices().map(|line| format!("{line}\n")).collect();
+    let hosts = record.hosts().join(" ");
+    let links = format!("# The fate of each packet, link by link.\n{asked}seed: {}\nhosts: {hosts}\n{devices}{links}", seed.value);
     files.push((MARKED.to_owned(), summary.into_bytes()));
     files.push(("trace.txt".to_owned(), trace.into_bytes()));
     files.push(("links.txt".to_owned(), links.into_bytes()));

@@ -35,6 +35,7 @@ impl Testbed {
         ];
         Again {
             names: Arc::clone(&self.setup.names),
+            hosts: self.setup.hosts(),
             said: Arc::clone(said),
             laws: laws.clone(),
             seed: seed.clone(),

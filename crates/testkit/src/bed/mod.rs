@@ -40,7 +40,7 @@ use crate::tcp::TcpConfig;
 use crate::trace::Trace;
 use crate::watch::{Kind, Watched};
 use crate::wire::Recorded;
-use crate::words::MiddleboxLine;
+use crate::words::DeviceLine;
 
 /// Test bed: hosts, the links between the hosts, and the settings of a run. A program runs on the hosts in virtual time.
 ///
@@ -403,10 +403,17 @@ impl Testbed {
 impl From<LinkFile> for Testbed {
     fn from(file: LinkFile) -> Self {
         let mut bed = Self::new(file.hosts());
-        for MiddleboxLine { behaviour, translates, inside } in &file.middleboxes {
-            let name = &file.hosts[bed.setup.names.len()];
-            let inside: Vec<&str> = inside.iter().map(|host| &*file.hosts[*host]).collect();
-            bed.setup.add_middlebox(name, behaviour.clone(), *translates, &inside);
+        for line in &file.devices {
+            let first = bed.setup.names.len();
+            let named = |nodes: &[usize]| nodes.iter().map(|node| &*file.hosts[*node]).collect::<Vec<_>>();
+            match line {
+                DeviceLine::Middlebox { behaviour, translates, inside } => {
+                    bed.setup.add_middlebox(&file.hosts[first], behaviour.clone(), *translates, &named(inside));
+                }
+                DeviceLine::Interfaces { host, count } => {
+                    bed.setup.add_interfaces(&file.hosts[*host], &named(&(first..first + count).collect::<Vec<_>>()));
+                }
+            }
         }
         bed.setup.read(file);
         bed

@@ -1,4 +1,4 @@
-//! NATs and firewalls of a test bed.
+//! NATs, firewalls and interfaces of a test bed.
 
 use std::fmt;
 use std::net::SocketAddr;
@@ -12,10 +12,10 @@ use crate::nat::{self, Behaviour, Protocol, parse_words};
 use crate::trace::Happening;
 
 impl Testbed {
-    /// Puts hosts behind a NAT. The hosts get addresses of a network of their own, 192.168.k.n for host n of NAT number k, and the NAT translates the addresses
-    /// of their packets over IPv4 to its own. IPv6 is filtered in the same way, but not translated. Hosts outside find neither the names nor the addresses of
-    /// hosts inside. Hosts of one network have links to each other and to their NAT, and the NAT has links to the hosts of the network outside. A NAT that was
-    /// added before can be behind a further NAT.
+    /// Puts hosts behind a NAT. The hosts get addresses of a new network, 192.168.k.n for host n of NAT number k, and the NAT puts its external address on
+    /// packets over IPv4. IPv6 is filtered in the same way, but not translated. Hosts outside find neither the names nor the addresses of
+    /// hosts inside. Hosts of one network have links to each other and to their NAT, and the NAT has links to the hosts of the network outside. A NAT added
+    /// before can be behind a further NAT.
     ///
     /// The words are a kind, and columns of the table with other values. Without a kind, the NAT is `home`.
     ///
@@ -27,9 +27,9 @@ impl Testbed {
     /// | `strict` | `address-and-port-dependent` | `address-and-port-dependent` | `random` | `no` | 120 s |
     /// | `cgnat` | `endpoint-independent` | `endpoint-independent` | `random` | `yes` | 300 s |
     ///
-    /// The network inside a `cgnat` is 100.64.k.n. Only outbound packets refresh a mapping. A port that is taken already, and each port with `ports random`, is
-    /// drawn from the seed. Connections of TCP follow RFC 5382: an established one ends after `tcp-timeout` (7440 s), and any other after
-    /// `tcp-transitory-timeout` (240 s), without a message to its ends. An unexpected SYN is answered by a reset after 6 s, unless the host inside has sent a
+    /// The network inside a `cgnat` is 100.64.k.n. Only outbound packets refresh a mapping. A taken port, and each port with `ports random`, is replaced by
+    /// a random port from the seed. Connections of TCP follow RFC 5382: an established connection ends after `tcp-timeout` (7440 s), and any other after
+    /// `tcp-transitory-timeout` (240 s), without a message to either end. An unexpected SYN is answered by a reset after 6 s, unless the host inside has sent a
     /// SYN to the same address by then. The terms are those of RFC 4787.
     ///
     /// ```
@@ -52,14 +52,45 @@ impl Testbed {
         self
     }
 
-    /// Puts hosts behind a firewall, which lets packets out, and in those that answer. The hosts keep their addresses and names. The words are `filter`, the
-    /// timeouts of [`Testbed::nat`], or nothing, which stands for the filter and the timeouts of `home`.
+    /// Puts hosts behind a firewall. A firewall lets packets out, and answers in. The hosts keep their addresses and names. The words are `filter`, the
+    /// timeouts of [`Testbed::nat`], or nothing for the filter and the timeouts of `home`.
     ///
     /// # Panics
     ///
     /// As [`Testbed::nat`].
     pub fn firewall<'a>(mut self, name: &str, words: &str, hosts: impl IntoIterator<Item = &'a str>) -> Self {
         self.add_middlebox(name, words, false, hosts);
+        self
+    }
+
+    /// Gives a host several interfaces, such as the two networks of a phone. An interface has addresses and links of its own, and can be behind a NAT: give its
+    /// name in place of the name of the host. The first interface is the uplink, from whose address unbound sockets send; [`Host::uplink`](crate::Host::uplink)
+    /// chooses the uplink. A socket bound to the address of an interface (`"lte:0"`) uses that interface. The name of the host stands for the addresses of its
+    /// uplink.
+    ///
+    /// ```
+    /// use cohaptic_testkit::Testbed;
+    ///
+    /// let bed = Testbed::new(["phone", "server"]).interfaces("phone", ["wifi", "lte"]).nat("home", "home", ["wifi"]).nat("carrier", "cgnat", ["lte"]);
+    /// let seen = bed.run(|bed| async move {
+    ///     let server = bed.host("server").bind("0.0.0.0:7").unwrap();
+    ///     let phone = bed.host("phone").bind("0.0.0.0:0").unwrap();
+    ///     let mut seen = Vec::new();
+    ///     for uplink in ["wifi", "lte"] {
+    ///         bed.host("phone").uplink(uplink);
+    ///         phone.send_to(b"who am I?", "server:7").await.unwrap();
+    ///         seen.push(server.recv_from(&mut [0; 9]).await.unwrap().1.ip().to_string());
+    ///     }
+    ///     seen
+    /// });
+    /// assert_eq!(seen, ["10.0.0.5", "10.0.0.6"]);
+    /// ```
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host, the host is behind a NAT or has interfaces already, or another host has one of the names.
+    pub fn interfaces<'a>(mut self, host: &str, interfaces: impl IntoIterator<Item = &'a str>) -> Self {
+        self.setup.add_interfaces(host, &interfaces.into_iter().collect::<Vec<_>>());
         self
     }
 
@@ -77,7 +108,7 @@ pub struct Nat {
     node: NodeId,
 }
 
-/// Mapping of a NAT: an endpoint inside, and the endpoint that stands for it outside.
+/// Mapping of a NAT: an endpoint inside, and the external endpoint of its packets.
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub struct NatMapping {
@@ -87,7 +118,7 @@ pub struct NatMapping {
     pub inside: SocketAddr,
     /// Address and port outside. Equal to `inside` where nothing is translated.
     pub outside: SocketAddr,
-    /// Addresses and ports to which the endpoint inside has sent, as far as the sessions have not ended, sorted.
+    /// Receivers of the endpoint inside in living sessions, sorted.
     pub peers: Vec<SocketAddr>,
 }
 
@@ -134,7 +165,7 @@ impl Nat {
     /// If the words are wrong.
     #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
     pub fn set(&self, words: &str) {
-        // The panic comes after the access to the state, which would be lost otherwise.
+        // A panic within the access would lose the state, and so comes afterwards.
         let set = self.shared.with(|core| {
             let is_nat = core.is_nat(self.node);
             let behaviour = core.behaviour_of(self.node);
@@ -160,7 +191,7 @@ impl Nat {
         self.shared.with(|core| core.mappings_of(self.node)).into_iter().map(of).collect()
     }
 
-    /// Returns the number of packets from outside that were dropped, because they belonged to no mapping or the filter did not permit the source.
+    /// Returns the number of packets from outside dropped for want of a mapping, or by the filter.
     #[must_use]
     pub fn filtered(&self) -> u64 {
         self.shared.with(|core| core.filtered_of(self.node))

@@ -39,7 +39,9 @@ impl Bed {
     #[must_use]
     pub fn host(&self, name: &str) -> Host {
         let node = self.names().node(name);
-        assert!(!self.shared.with(|core| core.is_middlebox(node)), "`{name}` is a NAT or a firewall, and runs no programs: `Bed::nat` returns it");
+        let (is_middlebox, host) = self.shared.with(|core| (core.is_middlebox(node), core.plan.host_of(node)));
+        assert!(!is_middlebox, "`{name}` is a NAT or a firewall, and runs no programs: `Bed::nat` returns it");
+        assert!(host == node, "`{name}` is an interface of host `{}`: take the host", self.names()[host.index()]);
         Host::new(Arc::clone(&self.shared), node)
     }
 
@@ -122,6 +124,44 @@ impl Bed {
     /// Ends the cuts of all paths.
     pub fn mend_all(&self) {
         self.shared.with(|core| core.wire.mend_all());
+    }
+
+    /// Puts the path from a host to another host on hold: packets that are under way or sent from now on wait at the end of the link, until [`Bed::release`]
+    /// lets them arrive. Nothing is lost, and nothing overtakes. The path back is not changed. The fates in the record tell when a packet came out of the link,
+    /// and the trace when it arrived.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    /// use cohaptic_testkit::{Instant, Testbed, time};
+    ///
+    /// Testbed::new(["client", "server"]).links("delay 20ms").run(|bed| async move {
+    ///     let server = bed.host("server").bind("0.0.0.0:7").unwrap();
+    ///     let client = bed.host("client").bind("0.0.0.0:0").unwrap();
+    ///     bed.hold("client", "server");
+    ///     client.send_to(b"hello", "server:7").await.unwrap();
+    ///     time::sleep(Duration::from_secs(5)).await;
+    ///     bed.release("client", "server");
+    ///     server.recv(&mut [0; 5]).await.unwrap();
+    ///     assert_eq!(bed.now(), Instant::from_nanos(5_000_000_000));
+    /// });
+    /// ```
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host, or a NAT or a firewall is between the hosts.
+    pub fn hold(&self, from: &str, to: &str) {
+        let path = self.link_path(from, to);
+        self.shared.with(|core| core.wire.hold(path));
+    }
+
+    /// Ends the hold of the path from a host to another host. The packets that have waited arrive now, in their order. Does nothing if the path is not on hold.
+    ///
+    /// # Panics
+    ///
+    /// As [`Bed::hold`].
+    pub fn release(&self, from: &str, to: &str) {
+        let path = self.link_path(from, to);
+        self.shared.with(|core| core.release(path));
     }
 
     /// Replaces the link from a host to another host. Packets inside the link follow the rules of [`cohaptic_wan::Link::set_model`].

@@ -91,6 +91,11 @@ impl Ends {
         self.is_broadcast() || Addresses::is_loopback(self.to, self.is_six)
     }
 
+    /// Returns whether the packet goes to a multicast group.
+    pub(super) const fn is_multicast(&self) -> bool {
+        !self.is_six && Addresses::is_multicast(self.to)
+    }
+
     /// Returns whether the packet goes to a broadcast address.
     pub(super) fn is_broadcast(&self) -> bool {
         !self.is_six && Addresses::is_broadcast(self.to)

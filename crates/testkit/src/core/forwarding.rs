@@ -1,4 +1,4 @@
-//! Way of a packet through NATs and firewalls, from node to node.
+//! Way of a packet through NATs and firewalls, from node to node, and by the interfaces of hosts with several.
 
 #[cfg(feature = "tcp")]
 use std::collections::VecDeque;
@@ -13,20 +13,21 @@ use super::{Core, Ends, Kind, Parcel};
 use crate::address::Addresses;
 use crate::middlebox::{Middlebox, Topology};
 use crate::nat::{Behaviour, Endpoint, Flow, Listed, Protocol, Signs, Table};
+use crate::settings::Settings;
 use crate::trace::{Happening, Lost};
 use crate::wire::Held;
 
-/// NATs and firewalls of a run.
+/// NATs, firewalls and interfaces of a run.
 pub(super) struct Forwarding {
     topology: Topology,
     /// State of each NAT and firewall, indexed by node; `None` for hosts.
     tables: Vec<Option<Table>>,
-    /// Opening segments from outside that no host inside expected, sorted by instant of the answer.
+    /// Unexpected opening segments from outside, sorted by instant of the answer.
     #[cfg(feature = "tcp")]
     unexpected: VecDeque<Unexpected>,
 }
 
-/// Opening segment of TCP from outside that was dropped, and is answered later.
+/// Dropped opening segment of TCP from outside, with a later answer.
 #[cfg(feature = "tcp")]
 struct Unexpected {
     /// Instant of the answer.
@@ -42,13 +43,13 @@ struct Unexpected {
 const SILENCE: Duration = Duration::from_secs(6);
 
 impl Forwarding {
-    /// Returns the state of a run, or `None` if the test bed has neither NATs nor firewalls.
-    pub(super) fn new(boxes: &[Middlebox], topology: Topology, names: &[String], seed: u64) -> Option<Box<Self>> {
-        if boxes.is_empty() {
+    /// Returns the state of a run, or `None` if the test bed has neither NATs nor firewalls nor hosts with several interfaces.
+    pub(super) fn new(settings: &Settings, topology: Topology, names: &[String], seed: u64) -> Option<Box<Self>> {
+        if settings.devices() == 0 {
             return None;
         }
         let mut tables: Vec<Option<Table>> = names.iter().map(|_| None).collect();
-        for Middlebox { node, behaviour, translates, .. } in boxes {
+        for Middlebox { node, behaviour, translates, .. } in &settings.middleboxes {
             tables[node.index()] = Some(Table::new(behaviour.clone(), *translates, seed, &names[node.index()]));
         }
         Some(Box::new(Self {
@@ -70,35 +71,47 @@ impl Forwarding {
 }
 
 impl Core {
-    /// Returns the path of a packet's first link, on the way from a host to another. `None` if no way leads there, or for a broadcast to another network.
+    /// Returns the path of a packet's first link, on the way from a host to another. `None` if no way leads there, or for a broadcast or multicast to another
+    /// network.
     pub(super) fn first_hop(&self, path: Path, ends: &Ends) -> Option<Path> {
         let Some(forwarding) = &self.forwarding else { return Some(path) };
-        let Path { from, to } = path;
-        let to = if ends.is_broadcast() {
-            // A broadcast stays in its network, and a NAT has no programs that could hear it.
-            let is_near = forwarding.topology.parent(from) == forwarding.topology.parent(to) && forwarding.tables[to.index()].is_none();
-            is_near.then_some(to)?
+        // A host with several interfaces sends by the interface with the source address of the packet, and receives by the interface with the destination.
+        let from = self.plan.node_at(path.from, ends.from, ends.is_six)?;
+        let to = if ends.is_broadcast() || ends.is_multicast() {
+            // Broadcast and multicast stay in the network of the sender. NATs and hosts without links hear neither.
+            let Path { to, .. } = path;
+            let is_near = forwarding.topology.parent(from) == forwarding.topology.parent(to) && self.plan.host_of(to) != path.from;
+            (is_near && forwarding.tables[to.index()].is_none() && self.plan.nodes_of(to).is_empty()).then_some(to)?
         } else {
-            forwarding.topology.hop(from, to, ends.is_six)?
+            forwarding.topology.hop(from, self.plan.node_at(path.to, ends.to, ends.is_six)?, ends.is_six)?
         };
         Some(Path { from, to })
     }
 
-    /// Returns whether a packet of `host` to an address without an owner is lost on the way, and not refused at once: a host behind a NAT sends whatever it does
-    /// not know to the NAT.
+    /// Returns whether a packet of `host` to an address without an owner is lost on the way, and not refused at once: a host behind a NAT sends whatever it
+    /// does not know to the NAT.
     pub(super) fn is_reachable(&self, host: NodeId, address: IpAddr) -> bool {
-        let is_inside = || self.forwarding.as_ref().is_some_and(|forwarding| forwarding.topology.is_inside(host));
+        let is_inside = || self.forwarding.as_ref().is_some_and(|forwarding| forwarding.topology.is_inside(self.plan.uplink(host)));
         self.plan.is_reachable(address) || address.is_ipv4() && is_inside()
     }
 
-    /// Returns the NAT outside of whose network `from` is, if `to` is in that network: see [`Topology::hides`].
+    /// Returns the NAT between `from` and the name and address of `to`: see [`Topology::hides`].
     pub(crate) fn hides(&self, from: NodeId, to: NodeId) -> Option<NodeId> {
-        self.forwarding.as_ref().and_then(|forwarding| forwarding.topology.hides(from, to))
+        let topology = &self.forwarding.as_ref()?.topology;
+        let to = self.plan.uplink(to);
+        // A host knows the names in the networks of all interfaces.
+        match self.plan.nodes_of(from) {
+            [] => topology.hides(from, to),
+            nodes => nodes.iter().map(|node| topology.hides(*node, to)).min()?,
+        }
     }
 
     /// Returns whether there is a link between two nodes.
     pub(crate) fn is_link(&self, path: Path) -> bool {
-        self.forwarding.as_ref().is_none_or(|forwarding| forwarding.topology.is_link(path.from, path.to))
+        let has_links = |node: NodeId| self.plan.nodes_of(node).is_empty();
+        self.forwarding
+            .as_ref()
+            .is_none_or(|forwarding| forwarding.topology.is_link(path.from, path.to) && has_links(path.from) && has_links(path.to))
     }
 
     /// Returns whether a node is a NAT or a firewall.
@@ -106,13 +119,13 @@ impl Core {
         self.forwarding.as_ref().is_some_and(|forwarding| forwarding.tables[node.index()].is_some())
     }
 
-    /// Passes a packet on that has arrived at a NAT or a firewall, or returns why the packet is lost.
+    /// Passes an arrived packet of a NAT or a firewall on, or returns why the packet is lost.
     pub(super) fn forward(&mut self, mut parcel: Box<Parcel>) -> Result<(), Lost> {
         let packet = parcel.arrival.packet;
         let Path { from, to: node } = packet.path;
         self.wire.held.remove(Held::cost(parcel.bytes.len()));
         #[cfg(feature = "tcp")]
-        // A damaged segment is no packet of a connection, as with Linux, which checks the checksum before it translates.
+        // As with Linux, a wrong checksum is found before the translation.
         if parcel.addresses.kind == Kind::Segment && parcel.bytes.segment().is_none() {
             return Err(Lost::Checksum);
         }
@@ -122,7 +135,7 @@ impl Core {
         let Ends { to, is_six, .. } = parcel.addresses;
         let owner = self.plan.owner_of(to, is_six).ok_or(Lost::NoSuchAddress)?;
         let next = self.first_hop(Path { from: node, to: owner }, &parcel.addresses).ok_or(Lost::NoSuchAddress)?;
-        // A mark of the link behind stays on the packet, because the next link reports its own marks only.
+        // A mark stays on the packet: the next link reports only new marks.
         if parcel.arrival.marked && parcel.ecn.is_capable() {
             parcel.ecn = Ecn::Congestion;
         }
@@ -132,12 +145,12 @@ impl Core {
             segment.ecn = parcel.ecn;
         }
         self.wire.note(Happening::Forwarded { packet, before, after });
-        // The caller polls the wire after each packet, so that a packet of a link without delay arrives there.
+        // The caller polls the wire after each packet, and so delivers a packet of a link without delay.
         let _ = self.wire.offer(next, parcel);
         Ok(())
     }
 
-    /// Writes the translated addresses on a packet that has come from the node `from`.
+    /// Writes the translated addresses on a packet from the node `from`.
     fn translate(&mut self, from: NodeId, node: NodeId, parcel: &mut Parcel) -> Result<(), Lost> {
         let (now, outer) = (self.now(), self.plan.short(node, false));
         let Some(forwarding) = &mut self.forwarding else { return Ok(()) };
@@ -182,7 +195,7 @@ impl Core {
         None
     }
 
-    /// Answers the unexpected opening segments that are due by a reset, unless the host inside has opened the same connection meanwhile.
+    /// Answers the due unexpected opening segments by a reset, unless the host inside has opened the same connection meanwhile.
     #[cfg(feature = "tcp")]
     pub(super) fn answer_unexpected(&mut self) {
         let now = self.now();
@@ -199,7 +212,7 @@ impl Core {
     }
 }
 
-/// Returns the protocol of a segment, and the flags that a NAT looks at.
+/// Returns the protocol of a segment, and the flags with a meaning for a NAT.
 #[cfg(feature = "tcp")]
 fn signs(segment: &cohaptic_tcp::Segment<'static>) -> (Protocol, Signs) {
     use cohaptic_tcp::Flags;

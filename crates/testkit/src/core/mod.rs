@@ -10,6 +10,7 @@ mod face;
 mod forwarding;
 #[cfg(feature = "facade")]
 mod holds;
+mod multicast;
 mod passing;
 mod shared;
 mod socket_name;
@@ -70,7 +71,7 @@ pub(crate) struct Core {
     #[cfg(feature = "facade")]
     unix: unix::Unix,
     pub(crate) woken: Woken,
-    /// NATs and firewalls; `None` without any.
+    /// NATs, firewalls and interfaces; `None` without any.
     forwarding: Option<Box<Forwarding>>,
     face: Arc<Face>,
     /// Number of the run whose state this is. 0 until [`Shared`] gives the number.
@@ -91,9 +92,11 @@ impl Core {
         let mut addresses = topology.addresses(&settings.middleboxes);
         // An address that the test chooses comes before the address that a network gives.
         addresses.extend(&settings.addresses);
+        let mut plan = AddressPlan::new(Arc::clone(names), &addresses);
+        settings.interfaces.iter().for_each(|interfaces| plan.add_interfaces(interfaces.host, &interfaces.nodes));
         Self {
-            plan: AddressPlan::new(Arc::clone(names), &addresses),
-            forwarding: Forwarding::new(&settings.middleboxes, topology, names, seed),
+            plan,
+            forwarding: Forwarding::new(&settings, topology, names, seed),
             wire: Wire::new(names, seed, &settings, changes, link),
             face: Arc::new(Face::new(settings.patience)),
             settings,
@@ -112,9 +115,9 @@ impl Core {
         }
     }
 
-    /// Returns the number of hosts. NATs and firewalls have the last numbers, and do not count.
+    /// Returns the number of hosts. NATs, firewalls and interfaces have the last numbers, and do not count.
     pub(crate) fn hosts(&self) -> usize {
-        self.hosts.len() - self.settings.middleboxes.len()
+        self.hosts.len() - self.settings.devices()
     }
 
     /// Returns whether other threads read the state while a task runs: a record of the run, or the counters of laws.
@@ -232,6 +235,8 @@ struct HostState {
     is_idle: bool,
     /// Sockets of the host, by port.
     bound: Bound,
+    /// Multicast groups that sockets of the host have joined, in short form. A group stands here once for each socket.
+    groups: Vec<u32>,
     /// Offset from [`FIRST_DYNAMIC`](sockets::FIRST_DYNAMIC) of the port to try next for a socket that asks for no particular port.
     next_port: u16,
 }
@@ -256,7 +261,7 @@ impl Core {
         if std::mem::replace(&mut state.is_down, true) {
             return;
         }
-        state.bound = Bound::default();
+        (state.bound, state.groups) = (Bound::default(), Vec::new());
         let now = self.now();
         // A dead socket stays in memory until its handle is dropped, so that the next call of the program returns the error.
         for socket in self.sockets.all_of(host) {
@@ -280,7 +285,7 @@ impl Core {
         let state = &mut self.hosts[host.index()];
         // For `restart`, which starts the program anew only if the program is gone.
         state.is_idle = true;
-        state.bound = Bound::default();
+        (state.bound, state.groups) = (Bound::default(), Vec::new());
         let now = self.now();
         for socket in self.sockets.all_of(host) {
             socket.die(now, &mut self.wire.held, &mut self.woken);
@@ -304,7 +309,15 @@ impl Core {
     /// Gives the host new addresses, and returns the new addresses.
     pub(crate) fn change_addresses(&mut self, host: NodeId) -> address::Addresses {
         self.wire.note(Happening::Readdressed(host));
-        let inside = self.forwarding.as_mut().and_then(|forwarding| forwarding.topology_mut().fresh(host));
+        let uplink = self.plan.uplink(host);
+        let inside = self.forwarding.as_mut().and_then(|forwarding| forwarding.topology_mut().fresh(uplink));
         self.plan.change(host, inside)
+    }
+
+    /// Makes an interface the uplink of its host, and returns the addresses that the host has now.
+    pub(crate) fn set_uplink(&mut self, host: NodeId, node: NodeId) -> address::Addresses {
+        self.wire.note(Happening::Readdressed(host));
+        self.plan.set_uplink(host, node);
+        self.plan.of(host)
     }
 }

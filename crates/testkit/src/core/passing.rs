@@ -38,6 +38,8 @@ enum Receivers {
     One,
     /// All hosts, the sender included.
     All,
+    /// The members of a multicast group in the network of the sender.
+    Group,
     /// No host: the datagram is lost without an error, as in a real network.
     Nobody,
 }
@@ -89,7 +91,7 @@ impl Core {
             }
             _ => {
                 let route = self.route(socket, to)?;
-                self.send_within(host, route, [from_port, to_port], is_six, bytes, ecn);
+                self.send_within(id, route, [from_port, to_port], is_six, bytes, ecn);
             }
         }
         // The check comes after the sending: a packet that arrives at once and is read or lost is not held any more.
@@ -101,8 +103,9 @@ impl Core {
 
     /// Sends a datagram that does not go to another host alone: to its own host, to all hosts, or to nobody.
     #[inline(never)]
-    fn send_within(&mut self, host: NodeId, route: Route, ports: [u16; 2], is_six: bool, bytes: &[u8], ecn: Ecn) {
+    fn send_within(&mut self, id: SocketId, route: Route, ports: [u16; 2], is_six: bool, bytes: &[u8], ecn: Ecn) {
         let Route { from, to, receivers } = route;
+        let host = self.sockets.get(id).host;
         let parcel = self.spare.copied(Ends::of([from, to], ports, is_six, Kind::Datagram), bytes, ecn);
         match receivers {
             Receivers::One => self.hand_over(host, parcel),
@@ -116,6 +119,7 @@ impl Core {
                 // Sockets of the sender hear a broadcast as well, over loopback.
                 self.hand_over(host, parcel);
             }
+            Receivers::Group => self.send_to_group(id, host, parcel),
             Receivers::Nobody => self.spare.put(parcel),
         }
     }
@@ -146,6 +150,8 @@ impl Core {
     fn source_to_host(&self, socket: &SocketState, number: u32, to: &SocketAddr) -> io::Result<u32> {
         match socket.at {
             None => Ok(self.plan.short(socket.host, to.is_ipv6())),
+            // As with Linux, the address of a group is no source.
+            Some(at) if !to.is_ipv6() && Addresses::is_multicast(at) => Ok(self.plan.short(socket.host, false)),
             Some(at) => self.check_source(socket.host, at, number, to).map(|()| at),
         }
     }
@@ -155,10 +161,11 @@ impl Core {
     fn other_receivers(&self, host: NodeId, to: &SocketAddr, number: &mut u32) -> io::Result<Receivers> {
         let ip = to.ip();
         if ip.is_multicast() {
-            return Err(io::Error::new(
-                io::ErrorKind::Unsupported,
-                format!("{to} is a multicast address, and a test bed has no multicast groups; send to each host, or broadcast"),
-            ));
+            let no_groups = || {
+                let text = format!("{to} is a multicast address of IPv6, and a test bed has groups of IPv4 alone; use one of 224.0.0.0/4");
+                Err(io::Error::new(io::ErrorKind::Unsupported, text))
+            };
+            return if ip.is_ipv4() { Ok(Receivers::Group) } else { no_groups() };
         }
         if ip.is_unspecified() {
             *number = Addresses::LOOPBACK[usize::from(ip.is_ipv6())];
@@ -179,6 +186,7 @@ impl Core {
     pub(super) fn source(&self, host: NodeId, at: Option<u32>, number: u32, to: &SocketAddr) -> io::Result<u32> {
         match at {
             None => Ok(self.source_to(host, number, to.is_ipv6())),
+            Some(at) if !to.is_ipv6() && Addresses::is_multicast(at) => Ok(self.source_to(host, number, false)),
             Some(at) => self.check_source(host, at, number, to).map(|()| at),
         }
     }
@@ -193,12 +201,13 @@ impl Core {
     #[inline(never)]
     fn check_source(&self, host: NodeId, at: u32, number: u32, to: &SocketAddr) -> io::Result<()> {
         let (addresses, bound) = (self.plan.of(host), Addresses::long(at, to.is_ipv6()));
+        let is_owned = self.plan.has(host, at, to.is_ipv6());
         // As with Linux, a socket at 127.0.0.1 or `::1` reaches its own host alone.
-        let stays = Addresses::is_loopback(number, to.is_ipv6()) || number == self.plan.short(host, to.is_ipv6());
+        let stays = Addresses::is_loopback(number, to.is_ipv6()) || self.plan.has(host, number, to.is_ipv6());
         if bound.is_loopback() && !stays {
             return Errno::InvalidInput.fail();
         }
-        if !bound.is_loopback() && !addresses.has(bound) {
+        if !bound.is_loopback() && !is_owned {
             let text = format!(
                 "host `{}` no longer has the address {bound}; it has {}. Bind a new socket",
                 self.plan.names()[host.index()],
@@ -256,6 +265,13 @@ impl Core {
     /// Delivers a packet that has come out of a link, and records its end.
     #[inline(never)]
     fn take_watched(&mut self, parcel: Box<Parcel>) {
+        if let Some(parcel) = self.wire.keep_back(parcel) {
+            self.take_released(parcel);
+        }
+    }
+
+    /// Like [`Core::take_watched`], for a packet whose path is not on hold.
+    fn take_released(&mut self, parcel: Box<Parcel>) {
         let Arrival { packet, at, is_cut, .. } = parcel.arrival;
         let end = if is_cut {
             self.wire.held.remove(Held::cost(parcel.bytes.len()));
@@ -267,9 +283,19 @@ impl Core {
                 Err(why) => Err(why),
             }
         } else {
-            self.arrive(Path { to: self.receiver(packet.path), ..packet.path }, parcel)
+            let host = self.plan.host_of(self.receiver(packet.path));
+            self.arrive(Path { to: host, ..packet.path }, parcel)
         };
         self.wire.ends(packet, at, end);
+    }
+
+    /// Ends the hold of a path: the packets that have waited arrive now, in the order in which they have come out of the link.
+    pub(crate) fn release(&mut self, path: Path) {
+        for parcel in self.wire.release(path) {
+            self.take_released(parcel);
+        }
+        // Packets that have gone on through a NAT, and answers over links without delay, arrive before the caller continues.
+        self.take_arrivals();
     }
 
     /// Returns the host at which the packets of a link arrive.
@@ -349,7 +375,10 @@ impl Core {
     /// Returns whether `host` has the address to which the packet goes.
     #[inline(always)]
     fn has_address(&self, host: NodeId, ends: &Ends) -> bool {
-        self.plan.short(host, ends.is_six) == ends.to || ends.is_to_any_host()
+        self.plan.short(host, ends.is_six) == ends.to
+            || ends.is_to_any_host()
+            || self.plan.is_of_interface(host, ends.to, ends.is_six)
+            || self.is_member(host, ends)
     }
 
     /// Returns why a packet without a receiving socket is lost. A host that is down has no sockets. If the host is up, the sender of a datagram is told.
@@ -363,7 +392,7 @@ impl Core {
         if !self.has_address(path.to, ends) {
             return Lost::NoSuchAddress;
         }
-        if ends.kind == Kind::Datagram && !ends.is_broadcast() {
+        if ends.kind == Kind::Datagram && !ends.is_broadcast() && !ends.is_multicast() {
             self.tell_unreachable(path, parcel);
         }
         Lost::NoSocket

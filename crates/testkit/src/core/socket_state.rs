@@ -8,6 +8,7 @@ use cohaptic_units::Instant;
 use cohaptic_wan::NodeId;
 
 use super::bound::Port;
+use super::multicast::Multicast;
 use super::waking::{Waiters, Woken};
 use super::{Ends, Parcel, SocketName, mapped, unmapped};
 use crate::address::Addresses;
@@ -57,6 +58,8 @@ pub(crate) struct SocketState {
     /// `true` if IP has refused a sent datagram, and the program has not been told.
     pub(super) refused: bool,
     pub(super) may_broadcast: bool,
+    /// Settings and groups of a socket that has to do with multicast; `None` for most sockets.
+    pub(super) multicast: Option<Box<Multicast>>,
     /// Instant at which the host crashed or the program of the host was killed; `None` while the socket lives.
     pub(super) died: Option<Instant>,
 }

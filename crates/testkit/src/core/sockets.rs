@@ -71,8 +71,21 @@ impl Core {
         };
         let (at, port) = ((!ip.is_unspecified()).then(|| Addresses::short(ip)), Port::new(ip.is_ipv6(), port));
         let (readers, inbox, room) = (Waiters::default(), VecDeque::new(), self.settings.receive_buffer);
-        let state =
-            SocketState { host, at, port, peer: None, room, inbox, held: 0, memory: 0, readers, refused: false, may_broadcast: false, died: None };
+        let state = SocketState {
+            host,
+            at,
+            port,
+            peer: None,
+            room,
+            inbox,
+            held: 0,
+            memory: 0,
+            readers,
+            refused: false,
+            may_broadcast: false,
+            multicast: None,
+            died: None,
+        };
         let bound = &mut self.hosts[host.index()].bound;
         // A dual socket is entered under both versions of IP, so that a packet of either version finds the socket by its port.
         let versions = state.versions();
@@ -83,7 +96,13 @@ impl Core {
 
     /// Checks that a socket of `host` can be bound to the address `ip`.
     pub(super) fn check_owned(&self, host: NodeId, ip: IpAddr) -> io::Result<()> {
-        if ip.is_unspecified() || self.plan.is_own(host, Addresses::short(ip), ip.is_ipv6()) { Ok(()) } else { Errno::AddrNotAvailable.fail() }
+        // As with Linux, a socket can be bound to the address of a group, and then hears this group alone.
+        let is_group = ip.is_ipv4() && ip.is_multicast();
+        if ip.is_unspecified() || is_group || self.plan.is_own(host, Addresses::short(ip), ip.is_ipv6()) {
+            Ok(())
+        } else {
+            Errno::AddrNotAvailable.fail()
+        }
     }
 
     fn is_taken(&self, host: NodeId, ip: IpAddr, port: u16) -> bool {
@@ -113,6 +132,7 @@ impl Core {
     pub(crate) fn close(&mut self, id: SocketId) {
         let Some(mut state) = self.sockets.places[id.0].take() else { return };
         state.clear(&mut self.wire.held);
+        self.leave_all(&state);
         self.sockets.free.push(id.0);
         // After a crash the host has forgotten its sockets, and the removal does nothing.
         state.versions().for_each(|port| self.hosts[state.host.index()].bound.remove(port, id));

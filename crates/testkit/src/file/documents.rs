@@ -30,15 +30,6 @@ impl LinkFile {
     pub(super) fn of_table(hosts: Vec<String>, table: &LinkTable, changes: Vec<LinkChange>, seed: u64) -> Self {
         let model = |place: usize| table.configs().get(place).map_or_else(LinkModel::default, |model| (**model).clone());
         let links: BTreeMap<_, _> = table.exceptions().map(|(pair, place)| (pair, model(place))).collect();
-        Self {
-            hosts,
-            middleboxes: Vec::new(),
-            every: model(table.usual()),
-            links,
-            changes,
-            access: BTreeMap::new(),
-            hits: Vec::new(),
-            seed: Some(seed),
-        }
+        Self { hosts, devices: Vec::new(), every: model(table.usual()), links, changes, access: BTreeMap::new(), hits: Vec::new(), seed: Some(seed) }
     }
 }

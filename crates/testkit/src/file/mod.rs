@@ -17,7 +17,7 @@ use crate::access::AccessLines;
 use crate::fault::WordsError;
 use crate::hit::PathHit;
 use crate::link::LinkChange;
-use crate::words::{self, MiddleboxLine};
+use crate::words::{self, DeviceLine};
 
 /// Hosts and the links between them, read from a file.
 ///
@@ -41,16 +41,17 @@ use crate::words::{self, MiddleboxLine};
 /// After the colon follow words of `tc-netem` for an exact emulation, or nothing for the ideal link, or `replay` and the file of a fate log, relative to the
 /// link file, or, with the feature `files`, the name of a link of the library such as `starlink/up`. `all` stands for every link without a line of its own;
 /// without `all` such links are ideal. Without `hosts` the lines name the hosts, in the order of the lines. `hit` and a path hit [packets](crate::hit) of the
-/// path. `nat` and `firewall`, with a name and [words](crate::Testbed::nat) of the behaviour, put the hosts after the colon behind a NAT or a firewall. Such a
-/// line stands after `hosts`, and before the lines that name the NAT.
+/// path. `nat` and `firewall`, with a name and [words](crate::Testbed::nat) of the behaviour, put the hosts after the colon behind a NAT or a firewall, and
+/// `interfaces` and a host give the host the [interfaces](crate::Testbed::interfaces) after the colon. Such a line stands after `hosts`, and before the lines
+/// that name the NAT or the interfaces.
 ///
 /// Relative paths begin in the folder in which the test runs; under `cargo test` this is the folder of the package.
 #[derive(Clone, PartialEq, Debug)]
 pub struct LinkFile {
-    /// Names of the hosts, then of the NATs and firewalls.
+    /// Names of the hosts, then of NATs, firewalls and interfaces.
     pub(crate) hosts: Vec<String>,
-    /// NATs and firewalls, in the order of their names. Each stands after all that are behind it.
-    pub(crate) middleboxes: Vec<MiddleboxLine>,
+    /// NATs, firewalls and interfaces, in the order of their names. A NAT stands after all that are behind it.
+    pub(crate) devices: Vec<DeviceLine>,
     /// Link of every path that is not in `links`.
     pub(crate) every: LinkModel,
     /// Links by indices of sender and receiver.
@@ -166,19 +167,19 @@ impl LinkFile {
     /// Returns the names of the hosts.
     #[must_use]
     pub fn hosts(&self) -> &[String] {
-        &self.hosts[..self.hosts.len() - self.middleboxes.len()]
+        &self.hosts[..self.hosts.len() - self.devices.iter().map(DeviceLine::names).sum::<usize>()]
     }
 
-    /// Returns the link from a host to another host at the beginning of the run. The hosts are given by their indices in [`LinkFile::hosts`]. NATs and
-    /// firewalls follow the hosts, in the order of their lines.
+    /// Returns the link from a host to another host at the beginning of the run. The hosts are given by their indices in [`LinkFile::hosts`]. NATs,
+    /// firewalls and interfaces follow the hosts, in the order of their lines.
     #[must_use]
     pub fn between(&self, from: usize, to: usize) -> &LinkModel {
         self.links.get(&(from, to)).unwrap_or(&self.every)
     }
 
     fn parse_with(text: &str, file: impl FnMut(&str) -> Result<String, String>) -> Result<Self, WordsError> {
-        let words::Words { hosts, middleboxes, every, links, hits, seed } = words::parse(text, file)?;
-        Ok(Self { hosts, middleboxes, every, links, changes: Vec::new(), access: BTreeMap::new(), hits, seed })
+        let words::Words { hosts, devices, every, links, hits, seed } = words::parse(text, file)?;
+        Ok(Self { hosts, devices, every, links, changes: Vec::new(), access: BTreeMap::new(), hits, seed })
     }
 
     #[cfg(not(feature = "files"))]

@@ -1,7 +1,7 @@
 //! NATs and firewalls as state machines: time and packets go in, translated addresses or causes of loss come out.
 //!
-//! The terms are those of RFC 4787 (Audet and Jennings 2007): a *mapping* is the external port that stands for an endpoint inside, and the *filter* decides
-//! which endpoints outside may send to a mapping. The machines know no hosts and no links: [`core`](crate::core) routes packets, and asks the machine of a
+//! The terms are those of RFC 4787 (Audet and Jennings 2007): a *mapping* is the external port of an endpoint inside, and the *filter* decides
+//! whether an endpoint outside may send to a mapping. The machines know no hosts and no links: [`core`](crate::core) routes packets, and asks the machine of a
 //! NAT on the way.
 
 mod session;
@@ -17,19 +17,19 @@ pub(crate) use words::{parse, parse_words};
 /// Behaviour of a NAT or a firewall.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Behaviour {
-    /// Kind whose columns the words have changed, as an index of [`KINDS`].
+    /// Kind before the changes by further words, as an index of [`KINDS`].
     kind: usize,
-    /// Remote endpoints between which one mapping is shared.
+    /// Remote endpoints with a common mapping.
     pub(crate) mapping: Dependence,
-    /// Remote endpoints that may send to a mapping.
+    /// Remote endpoints with permission to send to a mapping.
     pub(crate) filter: Dependence,
     pub(crate) ports: Ports,
-    /// `true` if a host inside reaches another host inside by the external address of the other host.
+    /// `true` if two hosts inside reach each other by their external addresses.
     pub(crate) hairpin: bool,
     pub(crate) timeouts: Timeouts,
 }
 
-/// Part of a remote endpoint on which a mapping or a filter depends.
+/// Part of a remote endpoint with a meaning for a mapping or a filter.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Dependence {
     Endpoint,
@@ -45,7 +45,7 @@ pub(crate) enum Ports {
     Random,
 }
 
-/// Spans without an outbound packet after which a session ends.
+/// Spans without an outbound packet until a session ends.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Timeouts {
     pub(crate) udp: Duration,
@@ -53,11 +53,11 @@ pub(crate) struct Timeouts {
     pub(crate) udp_unanswered: Duration,
     /// Timeout of an established connection of TCP.
     pub(crate) tcp: Duration,
-    /// Timeout of a connection of TCP that opens or closes.
+    /// Timeout of an opening or closing connection of TCP.
     pub(crate) tcp_transitory: Duration,
 }
 
-/// Kind of NAT: its name, and whether its network is that of a carrier (RFC 6598).
+/// Kind of NAT: name, columns of the table, and whether the network inside is a carrier's (RFC 6598).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Kind {
     name: &'static str,
@@ -101,6 +101,29 @@ impl Behaviour {
             tcp_transitory: Duration::from_secs(240),
         };
         Self { kind, mapping, filter, ports, hairpin, timeouts }
+    }
+
+    /// Returns the behaviour of a kind, counted from 0, the plainest: open, address, home, strict, and cgnat. `None` beyond the last.
+    #[cfg(feature = "strategies")]
+    pub(crate) fn nth(number: usize) -> Option<Self> {
+        let name = *["open", "address", "home", "strict", "cgnat"].get(number)?;
+        KINDS.iter().position(|kind| kind.name == name).map(Self::of_kind)
+    }
+
+    /// Returns a behaviour by which more packets pass: the kind without changed columns, or the next more open kind. `None` for the kind `open`.
+    #[cfg(feature = "strategies")]
+    pub(crate) fn plainer(&self) -> Option<Self> {
+        let kind = Self::of_kind(self.kind);
+        if *self != kind {
+            return Some(kind);
+        }
+        let plainer = match KINDS[self.kind].name {
+            "strict" => 2,
+            "home" => 1,
+            "address" | "cgnat" => 0,
+            _ => return None,
+        };
+        Self::nth(plainer)
     }
 
     /// Returns whether the hosts inside have addresses of 100.64.0.0/10.

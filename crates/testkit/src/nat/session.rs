@@ -1,4 +1,4 @@
-//! Sessions of a mapping: one remote endpoint with which a host inside talks, and the time for which the session lives.
+//! Sessions of a mapping: a remote endpoint in conversation with a host inside, and the lifetime of the session.
 
 use std::time::Duration;
 
@@ -9,11 +9,10 @@ use super::Timeouts;
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Protocol {
     Udp,
-    #[cfg_attr(not(feature = "tcp"), expect(dead_code, reason = "there are no segments without TCP"))]
     Tcp,
 }
 
-/// Flags of a segment that a NAT looks at. All are `false` for a datagram.
+/// Flags of a segment with a meaning for a NAT. All are `false` for a datagram.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
 pub(crate) struct Signs {
     pub(crate) syn: bool,
@@ -32,7 +31,7 @@ pub(super) enum Way {
 /// Session between an endpoint inside and a remote endpoint.
 #[derive(Clone, Debug)]
 pub(super) struct Session {
-    /// Instant of the last outbound packet, or of the SYN from outside that began the session.
+    /// Instant of the last outbound packet, or of the SYN from outside at the beginning of the session.
     last: Instant,
     /// `true` if a packet has come in since the session began.
     is_answered: bool,

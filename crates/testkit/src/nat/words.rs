@@ -20,10 +20,10 @@ const PORTS: [(&str, Ports); 2] = [("kept", Ports::Kept), ("random", Ports::Rand
 
 const YES_NO: [(&str, bool); 2] = [("yes", true), ("no", false)];
 
-/// Words of a firewall, which translates nothing.
+/// Words of a firewall. A firewall translates nothing.
 const OF_FIREWALLS: &str = "filter, udp-timeout, udp-unanswered-timeout, tcp-timeout or tcp-transitory-timeout";
 
-/// Returns the words that may follow the kind of a NAT.
+/// Returns the possible words after the kind of a NAT.
 fn expected(is_nat: bool) -> String {
     if is_nat { format!("mapping, ports, hairpin, {OF_FIREWALLS}") } else { OF_FIREWALLS.to_owned() }
 }
@@ -32,7 +32,7 @@ fn expected(is_nat: bool) -> String {
 pub(crate) fn parse_words(words: &str, base: Behaviour, is_nat: bool) -> Result<Behaviour, WordsError> {
     let mut spans = Vec::new();
     let mut end = 0;
-    // Each word is found after the end of the word before, so that equal words have spans of their own.
+    // The search for a word begins after the word before, so equal words have different spans.
     for word in words.split_whitespace() {
         let start = end + words[end..].find(word).unwrap_or(0);
         end = start + word.len();
@@ -41,8 +41,9 @@ pub(crate) fn parse_words(words: &str, base: Behaviour, is_nat: bool) -> Result<
     parse(words, &spans, base, is_nat).map_err(|fault| locate(1, words, fault))
 }
 
-/// Parses the words at `spans` of a line: a kind, if the first word is one, and columns of the table with their values. What the words leave out is as in `base`.
-/// `is_nat` is false for a firewall, which has neither kind nor mapping.
+/// Parses the words at `spans` of a line: a kind, if the first word is a kind, and columns of the table with values. All other columns are
+/// as in `base`.
+/// `is_nat` is false for a firewall: firewalls have neither kind nor mapping.
 pub(crate) fn parse(line: &str, spans: &[Range<usize>], base: Behaviour, is_nat: bool) -> Result<Behaviour, Fault> {
     let mut behaviour = base;
     let mut words = spans.iter().map(|span| (&line[span.clone()], span.clone())).peekable();
@@ -61,7 +62,7 @@ pub(crate) fn parse(line: &str, spans: &[Range<usize>], base: Behaviour, is_nat:
             "udp-timeout" => {
                 let Timeouts { udp, udp_unanswered, .. } = &mut behaviour.timeouts;
                 *udp = time(of)?;
-                // A mapping that waits for its first answer must not live longer than one that is used.
+                // A mapping without an answer must not live longer than an answered mapping.
                 *udp_unanswered = (*udp_unanswered).min(*udp);
             }
             "udp-unanswered-timeout" => behaviour.timeouts.udp_unanswered = time(of)?,
@@ -76,7 +77,7 @@ pub(crate) fn parse(line: &str, spans: &[Range<usize>], base: Behaviour, is_nat:
     Ok(behaviour)
 }
 
-/// Returns the value that a word names. `of` is the word and its span, or the place of the missing word.
+/// Returns the value of a word. `of` is the word and the span, or the place of the missing word.
 fn choice<T: Copy, const N: usize>(of: Result<(&str, Range<usize>), Range<usize>>, values: &[(&str, T); N]) -> Result<T, Fault> {
     let names = || values.map(|(name, _)| name).join(" or ");
     let (word, span) = of.map_err(|end| (end, format!("expected {}", names())))?;
@@ -100,7 +101,7 @@ impl Behaviour {
         self.columns().filter(|(name, _)| OF_FIREWALLS.contains(name)).map(|(name, value)| format!("{name} {value}")).collect::<Vec<_>>().join(" ")
     }
 
-    /// Returns the columns that differ from those of the kind, with their values.
+    /// Returns the columns with other values than the kind's, and the values.
     fn columns(&self) -> impl Iterator<Item = (&'static str, String)> {
         let kind = Self::of_kind(self.kind);
         let Timeouts { udp, udp_unanswered, tcp, tcp_transitory } = self.timeouts;
@@ -125,7 +126,7 @@ impl Behaviour {
 }
 
 impl fmt::Display for Behaviour {
-    /// Writes the words of a NAT: its kind, and the columns that differ.
+    /// Writes the words of a NAT: the kind, and the changed columns.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(KINDS[self.kind].name)?;
         self.columns().try_for_each(|(name, value)| write!(f, " {name} {value}"))

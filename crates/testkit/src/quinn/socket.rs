@@ -30,7 +30,7 @@ impl VirtualSocket {
     /// Returns whether the host may send from the address `source`. An address that the host has given up is not valid any more.
     fn may_send_from(&self, source: Option<IpAddr>) -> bool {
         // A socket of IPv6 names an address of IPv4 as `::ffff:10.0.0.1`.
-        source.map(|source| source.to_canonical()).is_none_or(|source| source.is_loopback() || self.host.addresses().has(source))
+        source.map(|source| source.to_canonical()).is_none_or(|source| source.is_loopback() || self.host.has_address(source))
     }
 }
 

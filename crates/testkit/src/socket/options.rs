@@ -17,8 +17,6 @@ use crate::errno::Errno;
 pub(super) struct Options {
     ttl: AtomicU32,
     type_of_service: AtomicU32,
-    multicast_ttl: AtomicU32,
-    multicast_loop: AtomicU32,
     send_buffer: AtomicU32,
 }
 
@@ -28,7 +26,7 @@ const SEND_BUFFER: u32 = 212_992;
 impl Default for Options {
     /// Returns the defaults of Linux.
     fn default() -> Self {
-        Self { ttl: 64.into(), type_of_service: 0.into(), multicast_ttl: 1.into(), multicast_loop: 1.into(), send_buffer: SEND_BUFFER.into() }
+        Self { ttl: 64.into(), type_of_service: 0.into(), send_buffer: SEND_BUFFER.into() }
     }
 }
 
@@ -48,7 +46,7 @@ fn set(option: &AtomicU32, value: u32, allowed: std::ops::RangeInclusive<u32>) -
 }
 
 fn no_groups<T>() -> io::Result<T> {
-    Err(io::Error::new(io::ErrorKind::Unsupported, "a test bed has no multicast groups; send to each host, or broadcast"))
+    Err(io::Error::new(io::ErrorKind::Unsupported, "a test bed has multicast groups of IPv4 alone: join one of 224.0.0.0/4"))
 }
 
 impl UdpSocket {
@@ -156,43 +154,47 @@ impl UdpSocket {
         self.set_tos_v4(class)
     }
 
-    /// Returns the time to live of multicast. The value has no effect, because a test bed has no multicast groups.
+    /// Returns the time to live of multicast over IPv4. The default is 1, as with Linux.
     ///
     /// # Errors
     ///
     /// If the host of the socket has crashed.
     pub fn multicast_ttl_v4(&self) -> io::Result<u32> {
-        self.option(|options| &options.multicast_ttl)
+        self.open(|core| core.multicast(self.id).ttl)
     }
 
-    /// Sets the time to live of multicast, from 0 to 255. The value is stored and has no effect, because a test bed has no multicast groups.
+    /// Sets the time to live of multicast over IPv4, from 0 to 255. With 0 a datagram reaches the own host alone. All other values mean the network of the
+    /// host: a test bed has no multicast routers.
     ///
     /// # Errors
     ///
     /// If `ttl` is out of range, or the host of the socket has crashed.
     pub fn set_multicast_ttl_v4(&self, ttl: u32) -> io::Result<()> {
-        self.set_option(|options| &options.multicast_ttl, ttl, 0..=255)
+        if ttl > 255 {
+            return Errno::InvalidInput.fail();
+        }
+        self.open(|core| core.multicast(self.id).ttl = ttl)
     }
 
-    /// Returns whether the socket would receive its own multicast over IPv4. The value has no effect, because a test bed has no multicast groups.
+    /// Returns whether sockets of the own host hear the multicast of this socket over IPv4. The default is `true`, as with Linux.
     ///
     /// # Errors
     ///
     /// If the host of the socket has crashed.
     pub fn multicast_loop_v4(&self) -> io::Result<bool> {
-        Ok(self.option(|options| &options.multicast_loop)? != 0)
+        self.open(|core| core.multicast(self.id).loops)
     }
 
-    /// Sets whether the socket would receive its own multicast over IPv4. The value is stored and has no effect.
+    /// Sets whether sockets of the own host hear the multicast of this socket over IPv4.
     ///
     /// # Errors
     ///
     /// If the host of the socket has crashed.
     pub fn set_multicast_loop_v4(&self, on: bool) -> io::Result<()> {
-        self.set_option(|options| &options.multicast_loop, on.into(), 0..=1)
+        self.open(|core| core.multicast(self.id).loops = on)
     }
 
-    /// Returns whether the socket would receive its own multicast over IPv6. The value has no effect, because a test bed has no multicast groups.
+    /// Returns whether the socket would receive its own multicast over IPv6. The value is that of IPv4, because a test bed has no groups of IPv6.
     ///
     /// # Errors
     ///
@@ -201,7 +203,7 @@ impl UdpSocket {
         self.multicast_loop_v4()
     }
 
-    /// Sets whether the socket would receive its own multicast over IPv6. The value is stored and has no effect.
+    /// Sets whether the socket would receive its own multicast over IPv6: see [`UdpSocket::multicast_loop_v6`].
     ///
     /// # Errors
     ///
@@ -210,16 +212,18 @@ impl UdpSocket {
         self.set_multicast_loop_v4(on)
     }
 
-    /// Fails: a test bed has no multicast groups to join.
+    /// Joins a multicast group. Datagrams of hosts in the same network to the group then reach the sockets of this host that are bound to the port, and to all
+    /// addresses or to the address of the group. `interface` is an address of the host, or unspecified. The membership ends with the socket.
     ///
     /// # Errors
     ///
-    /// Always [`io::ErrorKind::Unsupported`].
-    pub fn join_multicast_v4(&self, _group: Ipv4Addr, _interface: Ipv4Addr) -> io::Result<()> {
-        no_groups()
+    /// Those of Linux: `EINVAL` if `group` is no multicast address, `ENODEV` if the host does not have the address `interface`, `EADDRINUSE` if the socket has
+    /// joined the group already.
+    pub fn join_multicast_v4(&self, group: Ipv4Addr, interface: Ipv4Addr) -> io::Result<()> {
+        self.open(|core| core.join_group(self.id, group, interface))?
     }
 
-    /// Fails: a test bed has no multicast groups to join.
+    /// Fails: a test bed has no multicast groups of IPv6.
     ///
     /// # Errors
     ///
@@ -228,16 +232,16 @@ impl UdpSocket {
         no_groups()
     }
 
-    /// Fails: a test bed has no multicast groups to leave.
+    /// Leaves a multicast group.
     ///
     /// # Errors
     ///
-    /// Always [`io::ErrorKind::Unsupported`].
-    pub fn leave_multicast_v4(&self, _group: Ipv4Addr, _interface: Ipv4Addr) -> io::Result<()> {
-        no_groups()
+    /// As [`UdpSocket::join_multicast_v4`]; `EADDRNOTAVAIL` if the socket has not joined the group.
+    pub fn leave_multicast_v4(&self, group: Ipv4Addr, interface: Ipv4Addr) -> io::Result<()> {
+        self.open(|core| core.leave_group(self.id, group, interface))?
     }
 
-    /// Fails: a test bed has no multicast groups to leave.
+    /// Fails: a test bed has no multicast groups of IPv6.
     ///
     /// # Errors
     ///

@@ -13,6 +13,7 @@ use super::link::ImpairedLink;
 use super::network::ImpairedNetwork;
 use super::shrink::Search;
 use super::space::{LinkSpace, NetworkSpace};
+use crate::nat::Behaviour;
 
 /// Draws any link: [`links_like`] with [`LinkBounds::any`].
 pub fn any_link() -> Links {
@@ -76,7 +77,7 @@ pub fn any_network(hosts: usize) -> Networks {
 /// With no hosts, or more than 1000, or if the bounds make no sense; [`LinkBounds::check`] returns an error instead.
 #[track_caller]
 pub fn networks_like(hosts: usize, bounds: LinkBounds) -> Networks {
-    Networks { ideal: ImpairedNetwork::ideal(hosts), bounds: checked(bounds) }
+    Networks { ideal: ImpairedNetwork::ideal(hosts), bounds: checked(bounds), behind: Vec::new() }
 }
 
 #[track_caller]
@@ -101,13 +102,44 @@ pub struct Links {
 pub struct Networks {
     ideal: ImpairedNetwork,
     bounds: Arc<LinkBounds>,
+    /// Hosts that may be behind NATs.
+    behind: Vec<NodeId>,
+}
+
+impl Networks {
+    /// Puts these hosts behind NATs of any kind, each in half of all networks. Hosts are given by their numbers, from 0. Others cannot reach such a host before
+    /// it has sent something, and do not know its name, so name the hosts that begin a conversation: clients, not servers. The search for a lesser network
+    /// takes the NATs away first, and then tries more open kinds.
+    ///
+    /// ```
+    /// use cohaptic_testkit::proptest::prelude::*;
+    /// use cohaptic_testkit::strategies::any_network;
+    ///
+    /// proptest! {
+    ///     fn a_client_is_answered_behind_any_nat(network in any_network(2).behind_nats([0])) {
+    ///         prop_assert!(network.nats().all(|(host, _)| host.index() == 0));
+    ///     }
+    /// }
+    /// # a_client_is_answered_behind_any_nat();
+    /// ```
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host.
+    #[track_caller]
+    pub fn behind_nats(mut self, hosts: impl IntoIterator<Item = usize>) -> Self {
+        self.behind = hosts.into_iter().map(NodeId::new).collect();
+        let count = self.ideal.hosts();
+        assert!(self.behind.iter().all(|host| host.index() < count), "the network has {count} hosts: expected numbers below {count}");
+        self
+    }
 }
 
 #[cfg(feature = "scenes")]
 impl Networks {
     /// Creates a strategy of networks of `hosts` hosts. The bounds must have been checked.
     pub(super) fn within(hosts: usize, bounds: &Arc<LinkBounds>) -> Self {
-        Self { ideal: ImpairedNetwork::ideal(hosts), bounds: Arc::clone(bounds) }
+        Self { ideal: ImpairedNetwork::ideal(hosts), bounds: Arc::clone(bounds), behind: Vec::new() }
     }
 }
 
@@ -142,6 +174,14 @@ impl Strategy for Networks {
         for (from, to) in pairs {
             let is_ideal = Dice(runner.rng()).below(4) >= impaired;
             network = network.with_link(from, to, link(&self.bounds, is_ideal, runner)?);
+        }
+        // Drawn after the links, so that the links are those of the same network without NATs.
+        for host in &self.behind {
+            let mut dice = Dice(runner.rng());
+            if dice.one_in(2) {
+                let kind = dice.pick(0, &[1, 2, 3, 4]);
+                network.set_behaviour(*host, Behaviour::nth(kind));
+            }
         }
         Ok(Box::new(Search::new(NetworkSpace(LinkSpace(Arc::clone(&self.bounds))), network)))
     }

@@ -25,13 +25,14 @@
 //! need the delay, so the delay belongs to them. `delay 10ms 2ms reorder 25%` is two stages. Shrinking tries in this order, and keeps every change after which
 //! the test still fails:
 //!
-//! 1. *Fewer links*: all links of the network become ideal at once, then the first half of them and the second half, then halves of those halves that had to
-//!    stay, and so on down to single links. Links are sorted by sender, then receiver: the links of `a` come first.
+//! 1. *Fewer NATs and links*: the NATs of hosts ([`Networks::behind_nats`]) go with the links. All links of the network become ideal at once, then the first
+//!    half of them and the second half, then halves of those halves that had to stay, and so on down to single links. Links are sorted by sender, then receiver:
+//!    the links of `a` come first.
 //! 2. *Fewer stages*: the stages of all remaining links, in the same way. The stages of a link are in the order of the words.
-//! 3. *Plainer stages*, link by link. Reordering becomes its delay alone; jitter becomes its delay, jitter without correlation, or jitter without a
-//!    distribution. Bursts become random loss with the same long-run loss, otherwise loss without correlation, chains with fewer probabilities and the same
-//!    long-run loss, or two states in place of four. Corruption, duplication and reordering lose their correlation, and reordering its gap. Slots lose their
-//!    distribution, get a fixed length, and lose their limits.
+//! 3. *Plainer stages*, link by link, after more open NATs: `strict` becomes `home`, `address`, and `open`. Reordering becomes its delay alone; jitter becomes
+//!    its delay, jitter without correlation, or jitter without a distribution. Bursts become random loss with the same long-run loss, otherwise loss without
+//!    correlation, chains with fewer probabilities and the same long-run loss, or two states in place of four. Corruption, duplication and reordering lose their
+//!    correlation, and reordering its gap. Slots lose their distribution, get a fixed length, and lose their limits.
 //! 4. *Smaller numbers*, link by link: jitter, delay, loss, corruption, duplication, reordering, rate, limit, slots. Each number goes towards the end of its
 //!    range that impairs least: the upper end for rate and limit, the lower end for all others. That end is tried first, then numbers of one significant digit
 //!    by bisection, then numbers of two digits. More digits are tried only if the number drawn has more, and no rounder number fails. Results are numbers such

@@ -7,15 +7,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use cohaptic_wan::{LinkModel, NetworkConfig, NodeId};
 
 use super::link::{ImpairedLink, LinkError};
+use crate::nat::{Behaviour, parse_words};
 
 /// Maximum number of hosts of a network.
 const MOST: usize = 1_000;
 
 /// Hosts, with a link from each host to each other host. Most links may be ideal.
 ///
-/// The text form is a line with the number of hosts, followed by a line per impaired link. The names of the hosts are `a` to `z`, then `aa`, `ab`, and so on,
-/// in the order of their [`NodeId`]. `Debug` prints Rust code that makes the same value. The value can be parsed from the same lines; empty lines and blanks
-/// around lines are ignored, and `;` also ends a line.
+/// The text form is a line with the number of hosts, followed by a line per host behind a NAT (`nat a: strict`) and a line per impaired link. The names of the
+/// hosts are `a` to `z`, then `aa`, `ab`, and so on, in the order of their [`NodeId`]. `Debug` prints Rust code that makes the same value. The value can be
+/// parsed from the same lines; empty lines and blanks around lines are ignored, and `;` also ends a line.
 ///
 /// ```
 /// use cohaptic_testkit::strategies::{ImpairedLink, ImpairedNetwork};
@@ -33,6 +34,8 @@ pub struct ImpairedNetwork {
     hosts: usize,
     /// Links by sender and receiver. A missing entry is an ideal link.
     links: BTreeMap<(NodeId, NodeId), ImpairedLink>,
+    /// Behaviour of the NATs of hosts behind NATs.
+    nats: BTreeMap<NodeId, Behaviour>,
     ideal: ImpairedLink,
 }
 
@@ -59,6 +62,13 @@ pub enum NetworkTextError {
         /// Name of the last host.
         last: String,
     },
+    /// A line does not put a host behind a NAT.
+    Nat {
+        /// The line.
+        found: String,
+        /// Fault of the line.
+        reason: String,
+    },
     /// Two lines describe the same link.
     Repeated {
         /// The sender.
@@ -83,6 +93,7 @@ impl fmt::Display for NetworkTextError {
             Self::Hosts { found } => write!(f, "\"{found}\" is not a number of hosts: expected a first line such as \"3 hosts\", with 1 to {MOST}"),
             Self::Line { found } => write!(f, "\"{found}\" is not a link: expected a line such as \"a -> b: delay 24ms\""),
             Self::NoLink { found, first, last } => write!(f, "\"{found}\" is not a link between two of the hosts {first} to {last}"),
+            Self::Nat { found, reason } => write!(f, "\"{found}\" puts no host behind a NAT: {reason}"),
             Self::Repeated { from, to } => write!(f, "the link {from} -> {to} is given twice: expected one line for each link"),
             Self::Link { from, to, reason } => write!(f, "{from} -> {to}:\n{reason}"),
         }
@@ -101,7 +112,7 @@ impl ImpairedNetwork {
     #[track_caller]
     pub fn ideal(hosts: usize) -> Self {
         assert!((1..=MOST).contains(&hosts), "a network cannot have {hosts} hosts: expected 1 to {MOST} hosts");
-        Self { hosts, links: BTreeMap::new(), ideal: ImpairedLink::ideal() }
+        Self { hosts, links: BTreeMap::new(), nats: BTreeMap::new(), ideal: ImpairedLink::ideal() }
     }
 
     /// Parses the text that `Debug` prints.
@@ -133,6 +144,40 @@ impl ImpairedNetwork {
         );
         self.put(from, to, link);
         self
+    }
+
+    /// Returns the network with a host behind a NAT of its own. The words are those of [`Testbed::nat`](crate::Testbed::nat). The links of the host then are
+    /// the links of its NAT, and the link between host and NAT is ideal.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host, or the words are wrong.
+    #[must_use]
+    #[track_caller]
+    #[expect(clippy::panic, reason = "documented: for words that stand in a test")]
+    pub fn with_nat(mut self, host: NodeId, words: &str) -> Self {
+        assert!(host.index() < self.hosts, "there is no node {}: expected a number below {}", host.0, self.hosts);
+        let behaviour = parse_words(words, Behaviour::default(), true).unwrap_or_else(|error| panic!("these words do not describe a NAT: {error}"));
+        self.nats.insert(host, behaviour);
+        self
+    }
+
+    /// Returns the hosts behind NATs, with the words of their NATs, sorted by host.
+    pub fn nats(&self) -> impl Iterator<Item = (NodeId, String)> {
+        self.nats.iter().map(|(host, behaviour)| (*host, behaviour.to_string()))
+    }
+
+    /// Returns the behaviour of the NAT of a host.
+    pub(super) fn behaviour(&self, host: NodeId) -> Option<&Behaviour> {
+        self.nats.get(&host)
+    }
+
+    /// Sets the behaviour of the NAT of a host; `None` takes the NAT away.
+    pub(super) fn set_behaviour(&mut self, host: NodeId, behaviour: Option<Behaviour>) {
+        match behaviour {
+            Some(behaviour) => drop(self.nats.insert(host, behaviour)),
+            None => drop(self.nats.remove(&host)),
+        }
     }
 
     /// Returns the number of hosts.
@@ -198,6 +243,7 @@ impl ImpairedNetwork {
         let mut less = Self::ideal((self.hosts - 1).max(1));
         let links = self.links.iter().filter_map(|((from, to), link)| Some((moved(*from)?, moved(*to)?, link.clone())));
         links.for_each(|(from, to, link)| less.put(from, to, link));
+        less.nats = self.nats.iter().filter_map(|(host, behaviour)| Some((moved(*host)?, behaviour.clone()))).collect();
         less
     }
 
@@ -229,6 +275,9 @@ impl ImpairedNetwork {
 impl fmt::Display for ImpairedNetwork {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} hosts", self.hosts)?;
+        for (host, behaviour) in &self.nats {
+            write!(f, "\nnat {}: {behaviour}", Self::name(*host))?;
+        }
         // Stored links include links without impairments, such as a link with a seed only.
         for ((from, to), link) in &self.links {
             write!(f, "\n{} -> {}: {link}", Self::name(*from), Self::name(*to))?;
@@ -259,6 +308,15 @@ impl FromStr for ImpairedNetwork {
         // The network stores no ideal links, so a repeated line of an ideal link would not be noticed there.
         let mut said = BTreeSet::new();
         for line in lines {
+            if let Some((host, words)) = line.strip_prefix("nat ").filter(|_| !line.contains("->")).and_then(|rest| rest.split_once(':')) {
+                let wrong = |reason: String| NetworkTextError::Nat { found: line.to_owned(), reason };
+                let host = network.named(host.trim()).ok_or_else(|| wrong("there is no such host".to_owned()))?;
+                let behaviour = parse_words(words.trim(), Behaviour::default(), true).map_err(|error| wrong(error.message().to_owned()))?;
+                if network.nats.insert(host, behaviour).is_some() {
+                    return Err(wrong("the host has a NAT already".to_owned()));
+                }
+                continue;
+            }
             let halves = line.split_once("->").and_then(|(from, rest)| rest.split_once(':').map(|(to, words)| (from.trim(), to.trim(), words)));
             let Some((from, to, words)) = halves else { return Err(NetworkTextError::Line { found: line.to_owned() }) };
             let pair = network.named(from).zip(network.named(to)).filter(|(from, to)| from != to);

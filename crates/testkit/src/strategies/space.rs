@@ -81,6 +81,17 @@ pub(super) enum NetworkPart {
     Link(Pair),
     /// A single stage of a link.
     Stage(Pair, Stage),
+    /// The NAT of a host.
+    Nat(NodeId),
+}
+
+/// Form of a network that may become plainer.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum NetworkForm {
+    /// Form of a link.
+    Link(Pair, Form),
+    /// Behaviour of the NAT of a host.
+    Nat(NodeId),
 }
 
 impl NetworkSpace {
@@ -98,7 +109,7 @@ impl NetworkSpace {
 impl Space for NetworkSpace {
     type Value = ImpairedNetwork;
     type Part = NetworkPart;
-    type Form = (Pair, Form);
+    type Form = NetworkForm;
     type Place = (Pair, &'static Knob);
 
     const LEVELS: usize = 2;
@@ -111,13 +122,16 @@ impl Space for NetworkSpace {
         let mut pairs: Vec<Pair> = stages.into_iter().map(|(pair, _)| pair).collect();
         // The stages of a link are neighbours, so equal pairs are too.
         pairs.dedup();
-        pairs.into_iter().map(NetworkPart::Link).collect()
+        let nats = network.nats().map(|(host, _)| NetworkPart::Nat(host));
+        nats.chain(pairs.into_iter().map(NetworkPart::Link)).collect()
     }
 
     fn without(&self, network: &ImpairedNetwork, parts: &[NetworkPart]) -> Option<ImpairedNetwork> {
         let mut gone: Vec<(Pair, Vec<Stage>)> = Vec::new();
+        let mut network = network.clone();
         for part in parts {
             match *part {
+                NetworkPart::Nat(host) => network.set_behaviour(host, None),
                 NetworkPart::Link(pair) => gone.push((pair, self.0.parts(network.link(pair.0, pair.1)?, 0))),
                 // The parts keep the order of `parts`, in which the stages of a link are neighbours.
                 NetworkPart::Stage(pair, stage) => match gone.last_mut() {
@@ -127,15 +141,26 @@ impl Space for NetworkSpace {
             }
         }
         // A link that cannot change refuses the whole group. The search then tries halves of the group.
-        gone.into_iter().try_fold(network.clone(), |network, (pair, stages)| Self::changed(&network, pair, |link| self.0.without(link, &stages)))
+        gone.into_iter().try_fold(network, |network, (pair, stages)| Self::changed(&network, pair, |link| self.0.without(link, &stages)))
     }
 
-    fn forms(&self, network: &ImpairedNetwork) -> Vec<(Pair, Form)> {
-        Self::each(network, |link| self.0.forms(link))
+    fn forms(&self, network: &ImpairedNetwork) -> Vec<NetworkForm> {
+        let links = Self::each(network, |link| self.0.forms(link)).into_iter().map(|(pair, form)| NetworkForm::Link(pair, form));
+        // A kind has at most three plainer ones, and each step is a form of its own.
+        let nats = network.nats().flat_map(|(host, _)| [NetworkForm::Nat(host); 3]);
+        nats.chain(links).collect()
     }
 
-    fn plainer(&self, network: &ImpairedNetwork, (pair, form): &(Pair, Form)) -> Option<ImpairedNetwork> {
-        Self::changed(network, *pair, |link| self.0.plainer(link, form))
+    fn plainer(&self, network: &ImpairedNetwork, form: &NetworkForm) -> Option<ImpairedNetwork> {
+        match form {
+            NetworkForm::Link(pair, form) => Self::changed(network, *pair, |link| self.0.plainer(link, form)),
+            NetworkForm::Nat(host) => {
+                let plainer = network.behaviour(*host)?.plainer()?;
+                let mut network = network.clone();
+                network.set_behaviour(*host, Some(plainer));
+                Some(network)
+            }
+        }
     }
 
     fn places(&self, network: &ImpairedNetwork) -> Vec<(Pair, &'static Knob)> {

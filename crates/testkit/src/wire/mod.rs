@@ -9,7 +9,7 @@ mod hitting;
 mod parcel;
 mod recording;
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use cohaptic_units::Instant;
@@ -49,12 +49,14 @@ pub(crate) struct Wire<A> {
     changes: VecDeque<LinkChange>,
     /// Paths that are cut.
     cut: BTreeSet<Path>,
+    /// Packets that have come out of the links of paths on hold, in the order of arrival.
+    on_hold: BTreeMap<Path, Vec<Box<Parcel<A>>>>,
     /// Bytes that the run holds, on links and at sockets and nodes.
     pub(crate) held: Held,
     /// `true` if packets are hit by laws, recorded, stopped by cuts, or pass NATs or firewalls.
     is_watched: bool,
-    /// `true` if packets may pass NATs or firewalls, so that each one is looked at.
-    is_routed: bool,
+    /// Number of NATs, firewalls and interfaces. With any, each packet is looked at.
+    devices: usize,
     /// State of the laws; `None` without laws.
     hitting: Option<Box<Hitting<A>>>,
     recording: Recording,
@@ -88,9 +90,10 @@ impl<A: HasFlow + Clone + Send + Sync + 'static> Wire<A> {
             hitting,
             changes: changes.into(),
             cut: BTreeSet::new(),
+            on_hold: BTreeMap::new(),
             held: Held::new(settings.byte_limit),
             is_watched: false,
-            is_routed: !settings.middleboxes.is_empty(),
+            devices: settings.devices(),
             recording,
             drawn: Drawn::default(),
             said: Arc::clone(&settings.said),
@@ -105,8 +108,8 @@ impl<A: HasFlow + Clone> Wire<A> {
         self.now
     }
 
-    /// Returns whether packets are hit by laws, recorded, stopped by cuts, or pass NATs. If not, no arriving packet is cut, every packet goes from its sender to
-    /// its receiver over one link, and the ends of packets are not recorded.
+    /// Returns whether packets are hit by laws, recorded, stopped by cuts, or pass NATs. If not, no arriving packet is cut, every packet goes from its sender
+    /// to its receiver over one link, and the ends of packets are not recorded.
     #[inline]
     pub(crate) const fn is_watched(&self) -> bool {
         self.is_watched
@@ -114,7 +117,7 @@ impl<A: HasFlow + Clone> Wire<A> {
 
     /// Notes whether packets must be looked at one by one.
     fn watch(&mut self) {
-        self.is_watched = self.is_routed || self.hitting.is_some() || self.recording.is_on() || !self.cut.is_empty();
+        self.is_watched = self.devices > 0 || self.hitting.is_some() || self.recording.is_on() || !self.cut.is_empty() || !self.on_hold.is_empty();
     }
 
     /// Sets the time, which never goes back. Returns whether the time has moved.
@@ -290,6 +293,38 @@ impl<A: HasFlow + Clone> Wire<A> {
         }
     }
 
+    /// Puts a path on hold: its packets go on over the link, and wait at its end.
+    pub(crate) fn hold(&mut self, path: Path) {
+        // A host has no link to itself, so nothing of its own would ever wait.
+        if path.from != path.to && !self.on_hold.contains_key(&path) {
+            self.on_hold.insert(path, Vec::new());
+            self.watch();
+            self.note(Happening::Held(path));
+        }
+    }
+
+    /// Keeps a packet that has come out of the link of a path on hold. Returns the packet if its path is not on hold.
+    pub(crate) fn keep_back(&mut self, parcel: Box<Parcel<A>>) -> Option<Box<Parcel<A>>> {
+        match self.on_hold.get_mut(&parcel.arrival.packet.path) {
+            None => Some(parcel),
+            Some(waiting) => {
+                waiting.push(parcel);
+                None
+            }
+        }
+    }
+
+    /// Ends the hold of a path. Returns the packets that have waited, which arrive now.
+    pub(crate) fn release(&mut self, path: Path) -> Vec<Box<Parcel<A>>> {
+        let Some(mut waiting) = self.on_hold.remove(&path) else { return Vec::new() };
+        self.note(Happening::Released(path));
+        self.watch();
+        for parcel in &mut waiting {
+            (parcel.arrival.at, parcel.arrival.is_cut) = (self.now, self.cut.contains(&path));
+        }
+        waiting
+    }
+
     pub(crate) fn mend_all(&mut self) {
         std::mem::take(&mut self.cut).into_iter().for_each(|path| self.note(Happening::Mended(path)));
         self.watch();
@@ -332,6 +367,7 @@ impl<A: HasFlow + Clone> Wire<A> {
             hits: self.hit_counts(),
             drawn: self.drawn.clone(),
             said: Arc::clone(&self.said),
+            devices: self.devices,
         }
     }
 

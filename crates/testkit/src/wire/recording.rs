@@ -39,6 +39,8 @@ pub(crate) struct Recorded {
     pub(crate) drawn: Drawn,
     /// Description of the network as the test gave it.
     pub(crate) said: Arc<Said>,
+    /// Number of names that are no hosts.
+    pub(crate) devices: usize,
 }
 
 /// Bound for following packets to their ends: after this many events of the network a packet is taken to be stuck.

@@ -17,6 +17,8 @@ mod equivalence;
 mod facade;
 mod faults;
 mod hits;
+mod holds;
+mod interfaces;
 mod like_tokio;
 #[cfg(feature = "strategies")]
 mod limits;
@@ -24,6 +26,7 @@ mod link_files;
 mod loopback;
 mod many_hosts;
 mod misuse;
+mod multicast;
 mod nat;
 mod nodes;
 mod seeds;

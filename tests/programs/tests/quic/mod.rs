@@ -3,5 +3,6 @@
 mod determinism;
 mod letter;
 mod new_reno;
+mod roaming;
 mod transfer;
 mod trouble;

@@ -77,7 +77,7 @@ impl Core {
             path
         } else {
             // The segment is lost if the host has given the source address up, or if no host has the destination any more.
-            let Some(receiver) = self.plan.owner_of(to, is_six).filter(|_| self.plan.short(host, is_six) == from) else { return };
+            let Some(receiver) = self.plan.owner_of(to, is_six).filter(|_| self.plan.has(host, from, is_six)) else { return };
             let Some(path) = self.first_hop(Path { from: host, to: receiver }, &addresses) else { return };
             path
         };
@@ -111,7 +111,7 @@ impl Core {
             let (own, peers) = machine.initial_sequences();
             (own, peers.unwrap_or(0), machine.window_shift())
         } else {
-            let peer = self.tcp.routes.get(&super::route(self.receiver(packet.path), segment.destination, segment.source));
+            let peer = self.tcp.routes.get(&super::route(self.plan.host_of(self.receiver(packet.path)), segment.destination, segment.source));
             let (peers, own) = peer.map_or((0, None), |id| self.tcp.end(*id).machine.initial_sequences());
             (own.unwrap_or(0), peers, 0)
         };

@@ -246,3 +246,21 @@ fn the_words_of_a_file_with_nats_are_read() {
     assert_eq!(file.hosts(), ["alice", "bob", "carol"]);
     super::assert_shown(text);
 }
+
+#[test]
+fn a_phone_leaves_its_home() {
+    let bed = Testbed::new(["phone", "server"]).interfaces("phone", ["wifi", "lte"]).nat("home", "home", ["wifi"]).nat("carrier", "cgnat", ["lte"]);
+    bed.link_both("home", "server", "delay 10ms").link_both("carrier", "server", "delay 40ms").run(|bed| async move {
+        let server = bed.host("server").bind("0.0.0.0:7").unwrap();
+        let phone = bed.host("phone");
+        let socket = phone.bind("0.0.0.0:0").unwrap();
+        let mut seen = Vec::new();
+        for uplink in ["wifi", "lte"] {
+            phone.uplink(uplink);
+            socket.send_to(b"here I am", "server:7").await.unwrap();
+            seen.push(server.recv_from(&mut [0; 9]).await.unwrap().1.ip().to_string());
+        }
+        assert_eq!(seen, ["10.0.0.5", "10.0.0.6"]);
+        assert_eq!(bed.now(), Instant::from_nanos(50_000_000));
+    });
+}

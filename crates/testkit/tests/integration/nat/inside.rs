@@ -148,7 +148,7 @@ fn what_makes_no_sense_is_refused_with_the_way_out() {
         ("host `a` is named twice behind `n`", &|| drop(hosts().nat("n", "home", ["a", "a"]))),
         ("host `a` is behind `n` already, and cannot be behind `m` as well", &|| drop(nat().nat("m", "home", ["b", "a"]))),
         ("two hosts have the name `a`", &|| drop(hosts().nat("a", "home", ["b"]))),
-        ("`a` has no link to `b`, because a NAT or a firewall is between them", &|| nat().link("a", "b", "delay 1ms").run(nothing())),
+        ("`a` has no link to `b`, because a NAT, a firewall or an interface is between them", &|| nat().link("a", "b", "delay 1ms").run(nothing())),
         ("`b` has no link to `a`", &|| nat().hit("b", "a", "drop packet 0").run(nothing())),
         ("`a` has no link to `b`", &|| nat().run(|bed| async move { bed.cut("a", "b") })),
         ("`n` is a NAT or a firewall, and runs no programs", &|| nat().run(|bed| async move { drop(bed.host("n")) })),

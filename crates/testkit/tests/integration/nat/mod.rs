@@ -1,5 +1,7 @@
 //! NATs and firewalls.
 
+#[cfg(feature = "strategies")]
+mod drawn;
 mod firewalls;
 mod inside;
 mod punching;

@@ -151,3 +151,23 @@ proptest! {
         prop_assert!(shrunk.asked < 100, "{} steps", shrunk.asked);
     }
 }
+
+#[test]
+fn nats_go_first_and_those_that_stay_become_more_open() {
+    let has = |network: &ImpairedNetwork, kinds: &[&str]| network.nats().any(|(_, words)| kinds.contains(&&*words));
+    for (words, fails) in [
+        ("3 hosts", &(|_: &ImpairedNetwork| true) as &dyn Fn(&ImpairedNetwork) -> bool),
+        ("3 hosts; nat c: open", &|network| network.nats().any(|(host, _)| host == NodeId(2))),
+        ("3 hosts; nat c: strict", &|network| network.nats().any(|(host, words)| host == NodeId(2) && words == "strict")),
+        ("3 hosts; nat a: address; nat c: open", &|network| {
+            network.nats().count() == 2 && !has(network, &["cgnat"]) && has(network, &["address", "home"])
+        }),
+    ] {
+        let shrunk: Vec<ImpairedNetwork> =
+            (0..200).filter_map(|seed| shrink(&any_network(3).behind_nats([0, 2]), seed, fails)).map(|shrunk| shrunk.least).collect();
+        assert!(shrunk.len() > 10 && shrunk.contains(&ImpairedNetwork::words(words)), "{words}: {shrunk:?}");
+        // Where one of two hosts must have a NAT that is not open, either may be the one.
+        assert!(words.contains("address") || shrunk.iter().all(|least| *least == ImpairedNetwork::words(words)), "{words}");
+        assert!(shrunk.iter().all(|least| least.stages() == 0));
+    }
+}

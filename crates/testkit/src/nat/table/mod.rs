@@ -1,5 +1,8 @@
 //! Mappings of a NAT, and the sessions of a firewall.
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::BTreeMap;
 
 use cohaptic_units::Instant;
@@ -20,7 +23,7 @@ pub(crate) struct Endpoint {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Flow {
     pub(crate) protocol: Protocol,
-    /// `true` if both addresses are of IPv6, which nobody translates.
+    /// `true` if both addresses are of IPv6. IPv6 is never translated.
     pub(crate) is_six: bool,
     pub(crate) source: Endpoint,
     pub(crate) destination: Endpoint,
@@ -50,32 +53,32 @@ struct Mapping {
 #[derive(Clone, Debug)]
 pub(crate) struct Table {
     pub(crate) behaviour: Behaviour,
-    /// `true` for a NAT, which translates IPv4; `false` for a firewall.
+    /// `true` for a NAT, with translation of IPv4; `false` for a firewall.
     translates: bool,
     mappings: BTreeMap<Key, Mapping>,
     externals: BTreeMap<External, Key>,
-    /// Number of mappings beyond which ended mappings are removed.
+    /// Number of mappings. Beyond this number, ended mappings are removed.
     most: usize,
     /// Random stream of ports.
     stream: Stream,
     /// Number of ports drawn so far.
     drawn: u64,
-    /// Number of packets from outside that were dropped.
+    /// Number of dropped packets from outside.
     pub(crate) filtered: u64,
 }
 
 /// Mapping of a NAT, in the form for programs: short addresses inside and outside.
 pub(crate) type Listed = (Protocol, bool, Endpoint, Endpoint, Vec<Endpoint>);
 
-/// First port that is drawn at random: lower ports are for services (RFC 6335).
+/// First random port: lower ports are for services (RFC 6335).
 const FIRST: u16 = 1024;
 
-/// Number of mappings up to which ended mappings may stay.
+/// Number of mappings without any removal of ended mappings.
 const FEW: usize = 64;
 
 impl Table {
     pub(crate) fn new(behaviour: Behaviour, translates: bool, seed: u64, name: &str) -> Self {
-        // Names contain no blanks, so that no link has this label.
+        // Names contain no blanks, so no link has this label.
         let stream = Stream::new(seed, format!("ports of {name}").as_bytes());
         Self { behaviour, translates, mappings: BTreeMap::new(), externals: BTreeMap::new(), most: FEW, stream, drawn: 0, filtered: 0 }
     }
@@ -96,15 +99,15 @@ impl Table {
         self.externals.clear();
     }
 
-    /// Handles a packet from inside, and returns its source as outsiders see it. `outer` is the address of the NAT.
+    /// Handles a packet from inside, and returns the source as outsiders see the packet. `outer` is the address of the NAT.
     ///
     /// # Errors
     ///
-    /// [`Lost::NoMapping`] for a segment that opens no connection and belongs to none, or if all ports are taken.
+    /// [`Lost::NoMapping`] for a segment of no known connection, unless the segment opens a connection, or if all ports are taken.
     pub(crate) fn outbound(&mut self, now: Instant, flow: &Flow, outer: u32) -> Result<Endpoint, Lost> {
         let key = self.key(flow, flow.source, flow.destination);
         let is_known = self.session(now, &key, flow.destination).is_some();
-        // A connection that was forgotten is gone: its segments are dropped without an answer.
+        // Segments of a forgotten connection are dropped without an answer.
         if flow.protocol == Protocol::Tcp && !flow.signs.syn && !is_known {
             return Err(Lost::NoMapping);
         }
@@ -121,7 +124,7 @@ impl Table {
         }
         let timeouts = self.behaviour.timeouts;
         let mapping = self.mappings.get_mut(&key).ok_or(Lost::NoMapping)?;
-        // A mapping may talk to ever new endpoints. Ended sessions go whenever their number has doubled.
+        // A mapping may talk to ever new endpoints. Ended sessions go whenever the number of sessions has doubled.
         if !is_known && mapping.sessions.len() >= FEW && mapping.sessions.len().is_power_of_two() {
             mapping.sessions.retain(|_, session| session.lives(now, key.protocol, &timeouts));
         }
@@ -133,7 +136,7 @@ impl Table {
         Ok(mapping.external)
     }
 
-    /// Handles a packet from outside, and returns its destination inside.
+    /// Handles a packet from outside, and returns the destination inside.
     ///
     /// # Errors
     ///
@@ -144,7 +147,7 @@ impl Table {
         let Some(mapping) = self.mappings.get_mut(&key) else { return Err(Lost::NoMapping) };
         match mapping.sessions.get_mut(&flow.source).filter(|session| session.lives(now, key.protocol, timeouts)) {
             Some(session) => session.note(now, Way::In, flow.signs),
-            // A connection from outside, which the filter permits, needs a session for the answers from inside.
+            // A permitted connection from outside needs a session for the answers from inside.
             None if flow.signs.syn => {
                 let mut session = Session::new(now);
                 session.note(now, Way::In, flow.signs);
@@ -155,8 +158,8 @@ impl Table {
         Ok(key.inside)
     }
 
-    /// Handles an error message of IP from inside, about a packet from outside. Returns the source of the message as outsiders see it. Such a message makes no
-    /// mapping, and refreshes none (RFC 4787, requirement 12).
+    /// Handles an error message of IP from inside, about a packet from outside. Returns the source of the message as outsiders see the message. Such a message
+    /// neither makes nor refreshes a mapping (RFC 4787, requirement 12).
     ///
     /// # Errors
     ///
@@ -178,13 +181,13 @@ impl Table {
         self.permitted(now, flow).map(|key| key.inside).inspect_err(|_| self.filtered += 1)
     }
 
-    /// Returns whether a segment from outside belongs to a connection of which a SYN has come from inside.
+    /// Returns whether a segment from outside belongs to a connection with a SYN from inside.
     #[cfg(feature = "tcp")]
     pub(crate) fn is_permitted(&self, now: Instant, flow: &Flow) -> bool {
         self.permitted(now, flow).is_ok()
     }
 
-    /// Returns the mapping to which a packet from outside goes, if the filter permits the packet.
+    /// Returns the mapping of a packet from outside, if the filter permits the packet.
     fn permitted(&self, now: Instant, flow: &Flow) -> Result<Key, Lost> {
         let key = *self.externals.get(&(flow.protocol, flow.is_six, flow.destination)).ok_or(Lost::NoMapping)?;
         let mapping = self.mappings.get(&key).ok_or(Lost::NoMapping)?;
@@ -201,7 +204,7 @@ impl Table {
         Err(if self.lives(now, &key) { Lost::Filtered } else { Lost::NoMapping })
     }
 
-    /// Returns all mappings that are alive, sorted by protocol and endpoint inside, with the remote endpoints of their sessions.
+    /// Returns all living mappings, sorted by protocol and endpoint inside, with the remote endpoints of the sessions.
     pub(crate) fn listed(&self, now: Instant) -> Vec<Listed> {
         let of = |(key, mapping): (&Key, &Mapping)| {
             let lives = |session: &Session| session.lives(now, key.protocol, &self.behaviour.timeouts);
@@ -213,7 +216,7 @@ impl Table {
 
     fn key(&self, flow: &Flow, inside: Endpoint, remote: Endpoint) -> Key {
         let remote = match self.behaviour.mapping {
-            // Without translation an endpoint has one external endpoint, itself.
+            // Without translation an endpoint is the only external endpoint of itself.
             _ if !self.translates(flow.is_six) => None,
             Dependence::Endpoint => None,
             Dependence::Address => Some((remote.address, None)),
@@ -228,7 +231,7 @@ impl Table {
         session.lives(now, key.protocol, &self.behaviour.timeouts).then_some(session)
     }
 
-    /// Returns whether a mapping exists and has a session that is alive.
+    /// Returns whether a mapping exists and has a living session.
     fn lives(&self, now: Instant, key: &Key) -> bool {
         let lives = |session: &Session| session.lives(now, key.protocol, &self.behaviour.timeouts);
         self.mappings.get(key).is_some_and(|mapping| mapping.sessions.values().any(lives))
@@ -240,7 +243,7 @@ impl Table {
         }
     }
 
-    /// Returns whether no living mapping has the external port. A mapping that has ended gives its port up.
+    /// Returns whether no living mapping has the external port. An ended mapping gives the port up.
     fn is_free(&mut self, now: Instant, of: &Key, outer: u32, port: u16) -> bool {
         let external = (of.protocol, of.is_six, Endpoint { address: outer, port });
         let Some(holder) = self.externals.get(&external).copied() else { return true };
@@ -259,12 +262,12 @@ impl Table {
         let count = u64::from(u16::MAX - FIRST) + 1;
         let first = self.stream.packet(self.drawn).first(Purpose::Loss) % count;
         self.drawn += 1;
-        // After the drawn port the next free port is taken, so that the search ends also with few free ports.
+        // The search takes the next free port from the drawn port on, and so ends also with few free ports.
         let ports = (0..count).map(|step| FIRST + u16::try_from((first + step) % count).unwrap_or(0));
         ports.into_iter().find(|port| self.is_free(now, key, outer, *port))
     }
 
-    /// Removes ended mappings and sessions when there are many, so that memory follows the living ones.
+    /// Removes ended mappings and sessions beyond a number, so memory follows the living mappings.
     fn forget_ended(&mut self, now: Instant) {
         if self.mappings.len() <= self.most {
             return;
@@ -277,154 +280,5 @@ impl Table {
         let mappings = &self.mappings;
         self.externals.retain(|_, key| mappings.contains_key(key));
         self.most = FEW.max(2 * self.mappings.len());
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::parse_words;
-    use super::*;
-
-    const OUTER: u32 = 4;
-
-    fn endpoint(address: u32, port: u16) -> Endpoint {
-        Endpoint { address, port }
-    }
-
-    fn flow(source: Endpoint, destination: Endpoint) -> Flow {
-        Flow { protocol: Protocol::Udp, is_six: false, source, destination, signs: Signs::default() }
-    }
-
-    fn at(seconds: u64) -> Instant {
-        Instant::from_nanos(seconds * 1_000_000_000)
-    }
-
-    fn table(words: &str) -> Table {
-        Table::new(parse_words(words, Behaviour::default(), true).unwrap(), true, 7, "nat")
-    }
-
-    #[test]
-    fn a_filter_lets_in_the_endpoints_of_its_dependence() {
-        let [inside, remote] = [endpoint(100, 5000), endpoint(1, 7)];
-        for (words, expected) in [
-            ("filter endpoint-independent", [true, true, true]),
-            ("filter address-dependent", [true, true, false]),
-            ("filter address-and-port-dependent", [true, false, false]),
-        ] {
-            let mut table = table(words);
-            let external = table.outbound(at(0), &flow(inside, remote), OUTER).unwrap();
-            assert_eq!(external, endpoint(OUTER, 5000));
-            let passes = [remote, endpoint(1, 8), endpoint(2, 7)].map(|from| table.inbound(at(1), &flow(from, external)) == Ok(inside));
-            assert_eq!(passes, expected, "{words}");
-            assert_eq!(table.inbound(at(1), &flow(remote, endpoint(OUTER, 5001))), Err(Lost::NoMapping));
-            assert_eq!(table.filtered, 1 + expected.iter().filter(|passes| !**passes).count() as u64);
-        }
-    }
-
-    #[test]
-    fn a_mapping_is_shared_by_the_endpoints_of_its_dependence() {
-        let inside = endpoint(100, 5000);
-        for (words, expected) in [
-            ("mapping endpoint-independent", [true, true, true]),
-            ("mapping address-dependent", [true, true, false]),
-            ("mapping address-and-port-dependent", [true, false, false]),
-        ] {
-            for ports in ["kept", "random"] {
-                let mut table = table(&format!("{words} ports {ports}"));
-                let mut to = |remote| table.outbound(at(0), &flow(inside, remote), OUTER).unwrap();
-                let first = to(endpoint(1, 7));
-                assert_eq!(first == endpoint(OUTER, 5000), ports == "kept");
-                let same = [endpoint(1, 7), endpoint(1, 8), endpoint(2, 7)].map(|remote| to(remote) == first);
-                assert_eq!(same, expected, "{words}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_port_is_free_again_when_its_mapping_has_ended() {
-        let mut table = table("home");
-        let remote = endpoint(1, 7);
-        let kept = table.outbound(at(0), &flow(endpoint(100, 5000), remote), OUTER).unwrap();
-        let other = table.outbound(at(1), &flow(endpoint(101, 5000), remote), OUTER).unwrap();
-        assert_eq!((kept.port, table.has_drawn()), (5000, true));
-        assert!(other.port >= FIRST && other.port != 5000);
-        // Thirty seconds without an answer end a mapping.
-        assert_eq!(table.inbound(at(30), &flow(remote, kept)), Err(Lost::NoMapping));
-        assert_eq!(table.inbound(at(30), &flow(remote, other)), Ok(endpoint(101, 5000)));
-        let later = table.outbound(at(30), &flow(endpoint(102, 5000), remote), OUTER).unwrap();
-        assert_eq!(later.port, 5000);
-        assert_eq!(table.listed(at(30)).len(), 2);
-        table.forget();
-        assert!(table.listed(at(30)).is_empty());
-        assert_eq!(table.inbound(at(30), &flow(remote, other)), Err(Lost::NoMapping));
-    }
-
-    #[test]
-    fn all_ports_can_be_given_and_no_more() {
-        let mut table = table("home");
-        let remote = endpoint(1, 7);
-        let ports = (FIRST..=u16::MAX - 1).map(|port| table.outbound(at(0), &flow(endpoint(100, port), remote), OUTER).unwrap().port);
-        assert!(ports.eq(FIRST..=u16::MAX - 1));
-        // One port is left for the first that has to draw, and none for the second.
-        let drawn = table.outbound(at(0), &flow(endpoint(101, FIRST), remote), OUTER).unwrap();
-        assert_eq!((drawn.port, table.has_drawn()), (u16::MAX, true));
-        assert_eq!(table.outbound(at(0), &flow(endpoint(102, FIRST), remote), OUTER), Err(Lost::NoMapping));
-        table.outbound(at(30), &flow(endpoint(70_000, 1), remote), OUTER).unwrap();
-        assert_eq!(table.listed(at(30)).len(), 1);
-    }
-
-    #[test]
-    fn memory_follows_the_mappings_that_are_alive() {
-        let mut table = table("home udp-unanswered-timeout 1s");
-        for host in 0..1000 {
-            table.outbound(at(host.into()), &flow(endpoint(host, 1), endpoint(1, 7)), OUTER).unwrap();
-        }
-        assert!(table.mappings.len() <= FEW + 1 && table.externals.len() == table.mappings.len());
-        // The sessions of one mapping as well.
-        for port in 0..1000 {
-            table.outbound(at((1000 + port).into()), &flow(endpoint(1, 1), endpoint(1, port)), OUTER).unwrap();
-        }
-        let most = table.mappings.values().map(|mapping| mapping.sessions.len()).max().unwrap();
-        assert!(most <= FEW + 1, "{most}");
-    }
-
-    #[test]
-    fn a_firewall_and_version_6_translate_nothing() {
-        let [inside, remote] = [endpoint(100, 5000), endpoint(1, 7)];
-        let mut nat = table("strict");
-        let six = Flow { is_six: true, ..flow(inside, remote) };
-        assert_eq!(nat.outbound(at(0), &six, OUTER), Ok(inside));
-        assert_eq!(nat.inbound(at(1), &Flow { is_six: true, ..flow(remote, inside) }), Ok(inside));
-        assert_eq!(nat.inbound(at(1), &Flow { is_six: true, ..flow(endpoint(1, 8), inside) }), Err(Lost::Filtered));
-        let mut wall = Table::new(Behaviour::default(), false, 7, "wall");
-        assert_eq!(wall.outbound(at(0), &flow(inside, remote), OUTER), Ok(inside));
-        assert_eq!(wall.inbound(at(1), &flow(remote, inside)), Ok(inside));
-        assert_eq!(wall.inbound(at(1), &flow(remote, endpoint(101, 5000))), Err(Lost::NoMapping));
-    }
-
-    #[test]
-    fn an_error_message_refreshes_nothing() {
-        let [inside, remote] = [endpoint(100, 5000), endpoint(1, 7)];
-        let mut table = table("udp-timeout 10s");
-        let external = table.outbound(at(0), &flow(inside, remote), OUTER).unwrap();
-        assert_eq!(table.error_in(at(9), &flow(remote, external)), Ok(inside));
-        assert_eq!(table.error_out(at(9), &flow(inside, remote)), Ok(external));
-        assert_eq!(table.error_in(at(10), &flow(remote, external)), Err(Lost::NoMapping));
-        assert_eq!(table.error_out(at(10), &flow(inside, remote)), Err(Lost::NoMapping));
-    }
-
-    #[test]
-    fn a_segment_of_no_connection_is_dropped() {
-        let [inside, remote] = [endpoint(100, 5000), endpoint(1, 7)];
-        let mut table = table("home");
-        let segment =
-            |source, destination, syn| Flow { protocol: Protocol::Tcp, signs: Signs { syn, ..Signs::default() }, ..flow(source, destination) };
-        assert_eq!(table.outbound(at(0), &segment(inside, remote, false), OUTER), Err(Lost::NoMapping));
-        let external = table.outbound(at(0), &segment(inside, remote, true), OUTER).unwrap();
-        assert_eq!(table.inbound(at(1), &segment(remote, external, true)), Ok(inside));
-        // The connection is established, and lives for 7440 s.
-        assert_eq!(table.outbound(at(7439), &segment(inside, remote, false), OUTER), Ok(external));
-        assert_eq!(table.inbound(at(7439 + 7440), &segment(remote, external, false)), Err(Lost::NoMapping));
-        assert_eq!(table.outbound(at(7439 + 7440), &segment(inside, remote, false), OUTER), Err(Lost::NoMapping));
     }
 }

@@ -18,6 +18,8 @@
 //! [packets](crate::hit) of the path. `nat` or `firewall`, a name and the [words](crate::nat) of the behaviour put the hosts after the colon behind a NAT or a
 //! firewall.
 
+mod devices;
+
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::str::FromStr;
@@ -26,19 +28,19 @@ use std::sync::Arc;
 use cohaptic_wan::netem::Netem;
 use cohaptic_wan::{FateLog, LinkModel, MOST_NODES};
 
+pub(crate) use devices::DeviceLine;
+
 use crate::fault::{Fault, WordsError, locate};
 use crate::hit::{self, Hits, PathHit};
-use crate::middlebox::check_size;
 use crate::names::{Names, name_fault};
-use crate::nat::{self, Behaviour};
 
 /// Content of a link file.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct Words {
-    /// Names of the hosts, at least one, then those of NATs and firewalls.
+    /// Names of the hosts, at least one, then those of NATs, firewalls and interfaces.
     pub(crate) hosts: Vec<String>,
-    /// NATs and firewalls, in the order of their names.
-    pub(crate) middleboxes: Vec<MiddleboxLine>,
+    /// NATs, firewalls and interfaces, in the order of their names.
+    pub(crate) devices: Vec<DeviceLine>,
     /// Link of every path that is not in `links`.
     pub(crate) every: LinkModel,
     /// Links by indices of sender and receiver.
@@ -46,16 +48,6 @@ pub(crate) struct Words {
     /// Hits on packets.
     pub(crate) hits: Vec<PathHit>,
     pub(crate) seed: Option<u64>,
-}
-
-/// NAT or firewall of a link file.
-#[derive(Clone, PartialEq, Debug)]
-pub(crate) struct MiddleboxLine {
-    pub(crate) behaviour: Behaviour,
-    /// `true` for a NAT, `false` for a firewall.
-    pub(crate) translates: bool,
-    /// Indices of the hosts, NATs and firewalls directly behind.
-    pub(crate) inside: Vec<usize>,
 }
 
 /// Parses a text. `file` reads the file of a fate log, by the path in the text.
@@ -74,21 +66,22 @@ pub(crate) fn parse(text: &str, mut file: impl FnMut(&str) -> Result<String, Str
         return Err(locate(last.0, last.1, (end, "no line names a host: expected a line such as `a -> b: delay 24ms` or `hosts: a b`".to_owned())));
     }
     let Reader { links, hits, seed, .. } = reader;
-    // Lines name nodes in any order. NATs and firewalls go to the end.
-    let is_middlebox = |node: &usize| reader.middleboxes.iter().any(|(at, _)| at == node);
+    // Lines name nodes in any order. Nodes that are no hosts go to the end.
+    let is_device = |node: &usize| reader.devices.iter().any(|(first, line)| (*first..first + line.names()).contains(node));
     let mut order: Vec<usize> = (0..reader.hosts.len()).collect();
-    order.sort_by_key(is_middlebox);
+    order.sort_by_key(is_device);
     let place = |node: usize| order.iter().position(|other| *other == node).unwrap_or(node);
-    let inside = |line: MiddleboxLine| MiddleboxLine { inside: line.inside.into_iter().map(place).collect(), ..line };
+    let moved = |line: &DeviceLine| match line.clone() {
+        DeviceLine::Middlebox { behaviour, translates, inside } => {
+            DeviceLine::Middlebox { behaviour, translates, inside: inside.into_iter().map(place).collect() }
+        }
+        DeviceLine::Interfaces { host, count } => DeviceLine::Interfaces { host: place(host), count },
+    };
     Ok(Words {
         hosts: order.iter().map(|node| reader.hosts[*node].clone()).collect(),
-        middleboxes: reader.middleboxes.iter().map(|(_, line)| inside(line.clone())).collect(),
+        devices: reader.devices.iter().map(|(_, line)| moved(line)).collect(),
         every,
-        links: if reader.middleboxes.is_empty() {
-            links
-        } else {
-            links.into_iter().map(|((from, to), link)| ((place(from), place(to)), link)).collect()
-        },
+        links: if reader.devices.is_empty() { links } else { links.into_iter().map(|((from, to), link)| ((place(from), place(to)), link)).collect() },
         hits,
         seed,
     })
@@ -120,8 +113,8 @@ struct Reader {
     every: Option<LinkModel>,
     links: BTreeMap<(usize, usize), LinkModel>,
     hits: Vec<PathHit>,
-    /// NATs and firewalls with their indices in `hosts`.
-    middleboxes: Vec<(usize, MiddleboxLine)>,
+    /// NATs, firewalls and interfaces, with the index of their first name in `hosts`.
+    devices: Vec<(usize, DeviceLine)>,
     seed: Option<u64>,
 }
 
@@ -154,10 +147,12 @@ impl Reader {
                     self.links.insert(pair, link.clone()).is_some() || arrow == "<->" && self.links.insert((pair.1, pair.0), link).is_some();
                 if is_known { Err(twice(&whole, "this link")) } else { Ok(()) }
             }
+            ["interfaces", _] => self.interfaces(line, &subject[1], &rest),
             [noun @ ("nat" | "firewall"), _, ..] => self.middlebox(line, noun == "nat", &subject[1..], &rest),
             [noun @ ("nat" | "firewall")] => Err((subject[0].end..subject[0].end, format!("expected the name of the {noun}"))),
             _ => {
-                let expected = "expected `a -> b`, `a <-> b`, `all`, `hosts`, `nat NAME`, `firewall NAME`, `hit a -> b` or `seed` before the colon";
+                let expected = "expected `a -> b`, `a <-> b`, `all`, `hosts`, `nat NAME`, `firewall NAME`, `interfaces HOST`, `hit a -> b` or `seed` before \
+                                the colon";
                 Err((begin..colon.max(begin + 1), expected.to_owned()))
             }
         }
@@ -215,35 +210,6 @@ impl Reader {
         }
         // From here on a misspelt name is an error, and not a further host.
         self.is_closed = true;
-        Ok(())
-    }
-
-    /// Reads the line of a NAT, or of a firewall if `translates` is false. `subject` holds the name and the words of the behaviour, `rest` the hosts.
-    fn middlebox(&mut self, line: &str, translates: bool, subject: &[Range<usize>], rest: &[Range<usize>]) -> Result<(), Fault> {
-        let (span, words) = (&subject[0], &subject[1..]);
-        let name = &line[span.clone()];
-        if self.hosts.find(name).is_some() {
-            return Err((span.clone(), format!("`{name}` is a host already: expected a name of its own, in a line before those that name it")));
-        }
-        if let Some(fault) = name_fault(name) {
-            return Err((span.clone(), fault));
-        }
-        let behaviour = nat::parse(line, words, Behaviour::default(), translates)?;
-        let mut inside = Vec::new();
-        for span in rest {
-            let host = self.host(line, span)?;
-            if inside.contains(&host) || self.middleboxes.iter().any(|(_, other)| other.inside.contains(&host)) {
-                return Err((span.clone(), format!("host `{}` is behind a NAT or a firewall already: expected it once", &line[span.clone()])));
-            }
-            inside.push(host);
-        }
-        let translating = self.middleboxes.iter().filter(|(_, other)| other.translates).count();
-        check_size(translating, translates, inside.len()).map_err(|message| (rest_of(line, span, rest), message))?;
-        if self.hosts.len() == MOST_NODES {
-            return Err((span.clone(), format!("expected at most {MOST_NODES} hosts, NATs and firewalls")));
-        }
-        self.hosts.add(name.to_owned());
-        self.middleboxes.push((self.hosts.len() - 1, MiddleboxLine { behaviour, translates, inside }));
         Ok(())
     }
 
@@ -365,11 +331,22 @@ mod tests {
 
     #[test]
     fn nats_are_read_and_follow_the_hosts() {
-        let words = read("nat home-a: alice\nnat home-b strict udp-timeout 30s: bob\nhome-a -> meet: loss 1%\nfirewall wall: home-b carl").unwrap();
-        assert_eq!(words.hosts, ["alice", "bob", "meet", "carl", "home-a", "home-b", "wall"]);
-        let boxes: Vec<String> = words.middleboxes.iter().map(|line| format!("{} {} {:?}", line.translates, line.behaviour, line.inside)).collect();
-        assert_eq!(boxes, ["true home [0]", "true strict udp-timeout 30s [1]", "false home [5, 3]"]);
-        assert_eq!(words.links.keys().copied().collect::<Vec<_>>(), [(4, 2)]);
+        let words = read(
+            "interfaces bob: wifi lte\nnat home-a: alice\nnat home-b strict udp-timeout 30s: wifi\nhome-a -> meet: loss 1%\n\
+             firewall wall: home-b carl",
+        )
+        .unwrap();
+        assert_eq!(words.hosts, ["bob", "alice", "meet", "carl", "wifi", "lte", "home-a", "home-b", "wall"]);
+        let boxes: Vec<String> = words
+            .devices
+            .iter()
+            .map(|line| match line {
+                DeviceLine::Middlebox { behaviour, translates, inside } => format!("{translates} {behaviour} {inside:?}"),
+                DeviceLine::Interfaces { host, count } => format!("{count} of {host}"),
+            })
+            .collect();
+        assert_eq!(boxes, ["2 of 0", "true home [1]", "true strict udp-timeout 30s [4]", "false home [7, 3]"]);
+        assert_eq!(words.links.keys().copied().collect::<Vec<_>>(), [(6, 2)]);
         // A host may have the name of a word.
         assert_eq!(read("nat -> b: delay 1ms").unwrap().hosts, ["nat", "b"]);
     }
@@ -400,8 +377,12 @@ mod tests {
             ("nat n:", "1:7: expected the names of the hosts inside"),
             ("nat n odd: a", "1:7: unknown word \"odd\""),
             ("firewall n strict: a", "1:12: unknown word \"strict\""),
-            ("a -> b:\nnat a: c", "2:5: `a` is a host already"),
+            ("a -> b:\nnat a: c", "2:5: `a` is named already"),
             ("nat n: a\nnat m: a", "2:8: host `a` is behind a NAT or a firewall already"),
+            ("interfaces a:", "1:14: expected the names of the interfaces"),
+            ("nat n: a\ninterfaces a: w", "2:12: expected a host that is behind no NAT"),
+            ("interfaces a: w\nnat n: a", "2:8: host `a` is behind a NAT or a firewall already, or has interfaces"),
+            ("interfaces a: w w", "1:17: `w` is named already"),
             ("hosts: a\nnat n: b", "2:8: there is no host `b`"),
             ("é -> é: delay 1ms", "1:1: a host has no link to itself"),
             ("é -> b: delai 1ms", "1:9: unknown word \"delai\""),
