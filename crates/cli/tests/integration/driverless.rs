@@ -25,7 +25,7 @@ fn scenes_with_devices_are_read_and_run_in_virtual_time() {
         assert_eq!(outcome.status, Some(0), "{command}: {}", outcome.stderr);
     }
     // The keys of the device are checked too.
-    let refused = desk.cohaptic(&format!("check '{}' --set peers.left.falcon.force-limit=-1", scene.display()));
+    let refused = desk.cohaptic(&format!("run '{}' --set peers.left.falcon.force-limit=-1", scene.display()));
     assert_eq!(refused.status, Some(2));
     assert!(refused.stderr.contains("force-limit"), "{}", refused.stderr);
     let masses = desk.cohaptic(&format!("live '{}' --for 100ms --no-priority --set peer.kind=simulated", scene.display()));

@@ -115,6 +115,7 @@ pages! {
     model: "docs/model.md",
     netem: "docs/netem.md",
     own_device: "docs/own-device.md",
+    device_crate: "crates/device/README.md",
     falcon_crate: "crates/falcon/README.md",
     peer_crate: "crates/peer/README.md",
     prediction: "docs/prediction.md",

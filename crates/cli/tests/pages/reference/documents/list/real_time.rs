@@ -25,7 +25,10 @@ pub(super) const REAL_TIME: [Document; 7] = [
                 "of peers elsewhere: samples taken, joinings, samples refused and out of order",
             ),
             ("peers[].seat.late, peers[].seat.most_late_us", "late samples, counted at the next instant; the largest lateness"),
-            ("peers[].gate.zeroed.NAME", "of devices and pointers: ticks without force on the hand, by cause (docs/extending.md)"),
+            (
+                "peers[].gate.zeroed.NAME",
+                "of [devices](extending.md#a-device-of-your-own-in-rust) and pointers: ticks without force on the hand, by cause",
+            ),
             ("peers[].gate.limited, peers[].gate.slewed", "ticks at which the force on the hand was shortened, and its change"),
             ("link_totals.NAME, link_quantiles.NAME, links[].from, links[].to, links[].@Counters, access_lines", "as of a run"),
             ("door.address, door.handled", "with other programs: where it listens; `handled` = `admitted` + `welcomed` + all of `refused`"),
