@@ -41,6 +41,7 @@ use std::fmt;
 use std::io::{self, Write};
 use std::net::SocketAddr;
 
+use cohaptic_units::Instant;
 use cohaptic_units::print::Span;
 use cohaptic_wan::{Fate, PacketRecord, PathPart};
 
@@ -75,6 +76,17 @@ impl<W: Write> CaptureWriter<W> {
     /// The errors of the writer.
     pub fn write_packet(&mut self, record: &PacketRecord<impl Copy + Into<PathPart>>, packet: &[u8]) -> io::Result<()> {
         self.write_frame(record, &block::Frame { captured: packet.into(), length: packet.len() })
+    }
+
+    /// Writes a frame for a packet with known bytes that is sent at `at`, and whose fate is not known yet.
+    ///
+    /// # Errors
+    ///
+    /// The errors of the writer.
+    pub fn write_sent(&mut self, at: Instant, packet: &[u8]) -> io::Result<()> {
+        self.block.clear();
+        block::enhanced_packet(&mut self.block, at.as_nanos(), &block::Frame { captured: packet.into(), length: packet.len() }, "sent");
+        self.to.write_all(&self.block)
     }
 
     /// Writes a frame for a packet without known headers. `payload` has the known bytes of the packet. If `payload` is shorter than [`PacketRecord::size`],

@@ -14,6 +14,13 @@ pub struct Network {
 }
 
 impl Network {
+    /// Returns an address with the length of its prefix, or `None` for a prefix that is longer than the address.
+    #[must_use]
+    pub const fn new(address: IpAddr, prefix: u8) -> Option<Self> {
+        let most = if address.is_ipv4() { 32 } else { 128 };
+        if prefix > most { None } else { Some(Self { address, prefix }) }
+    }
+
     /// Returns the address as given, including the bits after the prefix.
     #[must_use]
     pub const fn address(self) -> IpAddr {
@@ -73,8 +80,7 @@ impl FromStr for Network {
             None if address.is_ipv4() => 32,
             None => 128,
         };
-        let bits = if address.is_ipv4() { 32 } else { 128 };
-        if prefix > bits { Err(NoNetwork) } else { Ok(Self { address, prefix }) }
+        Self::new(address, prefix).ok_or(NoNetwork)
     }
 }
 

@@ -25,9 +25,9 @@ pub struct Headers {
     /// Length of the fixed header and, with IPv4, its options \[bytes\]. The checksum of the IPv4 header covers these bytes.
     pub(super) covered: usize,
     /// Index of the first byte of the transport header, or `None` if the header is not in this packet.
-    pub(super) transport: Option<usize>,
+    pub transport: Option<usize>,
     /// `true` if the packet is no fragment.
-    pub(super) is_whole: bool,
+    pub is_whole: bool,
     /// Length of the packet \[bytes\], at most the number of bytes read.
     pub length: usize,
 }

@@ -7,6 +7,7 @@
 //!
 //! The module trusts no header: any bytes are read without a panic, and contradictions become [`Content::Malformed`].
 
+mod build;
 mod checksum;
 mod headers;
 mod segments;
@@ -18,9 +19,11 @@ use cohaptic_wan::{Damage, PacketInfo};
 use checksum::{change, sum, transport_field};
 use headers::V4_CHECKSUM;
 
+pub use build::Unreachable;
 pub use cohaptic_units::Ecn;
 pub use headers::{Headers, Malformed};
-pub(crate) use segments::{Join, cut, join, slices};
+pub use segments::Join;
+pub(crate) use segments::{cut, join, slices};
 
 /// Framing of the bytes of a device.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -75,6 +78,13 @@ impl Packet {
             Err(malformed) => Content::Malformed(malformed),
         };
         Self { bytes, content, is_checked: false }
+    }
+
+    /// Reads the headers of a packet of IP whose maker has computed the checksums. A device may join such packets to a segment.
+    #[must_use]
+    pub fn checked(bytes: Vec<u8>) -> Self {
+        let content = Headers::read(&bytes).map_or_else(Content::Malformed, |headers| Content::Ip { at: 0, headers });
+        Self { bytes, content, is_checked: true }
     }
 
     /// Returns the kind of the packet, with the headers.

@@ -13,7 +13,7 @@ use cohaptic_linkfile::router::{Attachment, Side};
 
 use crate::packet::Packet;
 pub use interface::Interface;
-pub use tun::Tun;
+pub use tun::{Tun, lead_all};
 
 /// Device that gives and takes packets without ever blocking.
 pub trait Device {

@@ -17,6 +17,8 @@ pub(super) struct Netlink {
 const NEW_LINK: u16 = 16;
 /// `RTM_NEWADDR`.
 const NEW_ADDRESS: u16 = 20;
+/// `RTM_NEWROUTE`.
+const NEW_ROUTE: u16 = 24;
 /// `NLM_F_REQUEST` and `NLM_F_ACK`: a request that the kernel answers.
 const REQUEST: u16 = 0x1 | 0x4;
 /// `NLM_F_CREATE` and `NLM_F_REPLACE`: an object that exists already is no error.
@@ -29,6 +31,8 @@ const ATTRIBUTE_QUEUE: u16 = 13;
 const ATTRIBUTE_ADDRESS: u16 = 1;
 /// `IFA_LOCAL`.
 const ATTRIBUTE_LOCAL: u16 = 2;
+/// `RTA_OIF`.
+const ATTRIBUTE_DEVICE: u16 = 4;
 /// `IFF_UP`.
 const FLAG_UP: u32 = 0x1;
 /// `IFF_PROMISC`.
@@ -80,6 +84,18 @@ impl Netlink {
             IpAddr::V6(address) => [ATTRIBUTE_LOCAL, ATTRIBUTE_ADDRESS].map(|kind| attribute(&mut body, kind, &address.octets())),
         };
         self.ask(NEW_ADDRESS, REQUEST | CREATE, &body)
+    }
+
+    /// Adds the default route of an address family: packets to all addresses without a narrower route go into the device.
+    pub(super) fn lead_all(&self, index: u32, family: AddressFamily) -> io::Result<()> {
+        /// `RT_TABLE_MAIN`, `RTPROT_STATIC`, `RT_SCOPE_UNIVERSE` and `RTN_UNICAST`.
+        const KIND: [u8; 4] = [254, 4, 0, 1];
+        // Fields of `struct rtmsg`: family, lengths of destination and source, type of service, the kind, and flags.
+        let mut body = vec![u8::try_from(family as i32).map_err(io::Error::other)?, 0, 0, 0];
+        body.extend(KIND);
+        body.extend([0; 4]);
+        attribute(&mut body, ATTRIBUTE_DEVICE, &index.to_ne_bytes());
+        self.ask(NEW_ROUTE, REQUEST | CREATE, &body)
     }
 
     /// Sends a request and waits for the answer. Returns the error in the answer.

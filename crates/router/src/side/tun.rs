@@ -3,13 +3,15 @@
 //! With offloads (`IFF_VNET_HDR`, `TUNSETOFFLOAD`) the host leaves to the router to cut large segments of TCP and UDP and to compute checksums, and takes such
 //! segments from the router. One system call then carries up to 64 packets.
 
-use std::io;
-use std::os::fd::{AsFd as _, BorrowedFd};
+use std::fs::File;
+use std::io::{self, Read as _, Write as _};
+use std::os::fd::{AsFd as _, BorrowedFd, OwnedFd};
 use std::sync::Arc;
 
 use cohaptic_linkfile::router::TunSpec;
 use nix::net::if_::if_nametoindex;
-use tun_rs::{DeviceBuilder, SyncDevice};
+use nix::sys::socket::AddressFamily;
+use tun_rs::DeviceBuilder;
 
 use super::netlink::Netlink;
 use super::{Device, Failed, LONGEST, Sent};
@@ -19,8 +21,11 @@ use crate::packet::{Framing, Join, Packet, cut, join, slices};
 const WAITING: u32 = 2_000;
 
 /// TUN device. A device made by the router disappears with this value.
+///
+/// A process without the right to make the device can use the device of another process: [`into_descriptor`](Self::into_descriptor) on one side of a Unix socket,
+/// [`of_descriptor`](Self::of_descriptor) on the other side.
 pub struct Tun {
-    device: SyncDevice,
+    device: File,
     name: String,
     /// Kinds of packets joined for the device; `None` without offloads.
     offloads: Option<Join>,
@@ -37,8 +42,13 @@ impl std::fmt::Debug for Tun {
 }
 
 impl Tun {
-    /// Creates the device, adds its addresses and switches it on, or attaches to an existing device.
-    pub(super) fn open(spec: &TunSpec) -> Result<Self, Failed> {
+    /// Creates the device in the network namespace of the calling thread, adds its addresses and switches it on, or attaches to an existing device. The
+    /// namespace in `spec` is only for messages.
+    ///
+    /// # Errors
+    ///
+    /// [`Failed`] with the failed step.
+    pub fn open(spec: &TunSpec) -> Result<Self, Failed> {
         let name = spec.name.as_str();
         // Without this check, `/dev/net/tun` would create a missing device.
         if spec.existing && if_nametoindex(name).is_err() {
@@ -51,27 +61,59 @@ impl Tun {
         let device = builder.build_sync().map_err(Failed::system("open it through /dev/net/tun"))?;
         device.set_nonblocking(true).map_err(Failed::system("read it without waiting"))?;
         let offloads = device.tcp_gso().then_some(if device.udp_gso() { Join::TcpAndUdp } else { Join::Tcp });
-        let tun = Self { device, name: name.to_owned(), offloads, buffer: vec![0; LONGEST], head: Vec::new() };
         if !spec.existing {
-            tun.configure(spec)?;
+            let index = device.if_index().map_err(Failed::system("look up its number"))?;
+            configure(index, spec)?;
         }
-        Ok(tun)
+        // The device stays as long as any descriptor of its file is open, so the value of `tun_rs` is not needed any more.
+        let descriptor = device.as_fd().try_clone_to_owned().map_err(Failed::system("copy its descriptor"))?;
+        Ok(Self::of_descriptor(descriptor, name, offloads))
     }
 
-    /// Sets queue length, packet length and addresses of a new device, and switches the device on.
-    fn configure(&self, spec: &TunSpec) -> Result<(), Failed> {
-        let index = self.device.if_index().map_err(Failed::system("look up its number"))?;
-        let netlink = Netlink::open().map_err(Failed::system("speak to the kernel through rtnetlink"))?;
-        netlink.waiting(index, WAITING).map_err(Failed::system("let packets wait in it"))?;
-        if let Some(mtu) = spec.mtu {
-            netlink.mtu(index, mtu).map_err(Failed::system(format!("set its mtu to {mtu}")))?;
-        }
-        for address in &spec.addresses {
-            netlink.address(index, *address).map_err(Failed::system(format!("give it the address {address}")))?;
-        }
-        // Last, so that no packet arrives at a device that is only half configured.
-        netlink.up(index).map_err(Failed::system("switch it on"))
+    /// Returns the device of a descriptor that another process has opened without waiting. `offloads` are those of the device.
+    #[must_use]
+    pub fn of_descriptor(descriptor: OwnedFd, name: &str, offloads: Option<Join>) -> Self {
+        Self { device: File::from(descriptor), name: name.to_owned(), offloads, buffer: vec![0; LONGEST], head: Vec::new() }
     }
+
+    /// Returns the descriptor of the device, and its offloads, for another process.
+    #[must_use]
+    pub fn into_descriptor(self) -> (OwnedFd, Option<Join>) {
+        (self.device.into(), self.offloads)
+    }
+}
+
+/// Sets queue length, packet length and addresses of a new device, and switches the device on.
+fn configure(index: u32, spec: &TunSpec) -> Result<(), Failed> {
+    let netlink = Netlink::open().map_err(Failed::system("speak to the kernel through rtnetlink"))?;
+    netlink.waiting(index, WAITING).map_err(Failed::system("let packets wait in it"))?;
+    if let Some(mtu) = spec.mtu {
+        netlink.mtu(index, mtu).map_err(Failed::system(format!("set its mtu to {mtu}")))?;
+    }
+    for address in &spec.addresses {
+        netlink.address(index, *address).map_err(Failed::system(format!("give it the address {address}")))?;
+    }
+    // Last, so that no packet arrives at a device that is only half configured.
+    netlink.up(index).map_err(Failed::system("switch it on"))
+}
+
+/// Prepares the new network namespace of the calling thread: switches the loopback interface on, and leads all packets to other hosts into the device of
+/// `spec`, in both versions of IP in which the device has an address.
+///
+/// # Errors
+///
+/// [`Failed`] with the failed step.
+pub fn lead_all(spec: &TunSpec) -> Result<(), Failed> {
+    let netlink = Netlink::open().map_err(Failed::system("speak to the kernel through rtnetlink"))?;
+    let index = |name: &str| if_nametoindex(name).map_err(|error| Failed::system(format!("look up the number of {name}"))(error.into()));
+    netlink.up(index("lo")?).map_err(Failed::system("switch the loopback interface on"))?;
+    let device = index(&spec.name)?;
+    for (family, is_v4) in [(AddressFamily::Inet, true), (AddressFamily::Inet6, false)] {
+        if spec.addresses.iter().any(|network| network.address().is_ipv4() == is_v4) {
+            netlink.lead_all(device, family).map_err(Failed::system("lead all packets into it"))?;
+        }
+    }
+    Ok(())
 }
 
 impl Device for Tun {
@@ -80,7 +122,7 @@ impl Device for Tun {
     }
 
     fn receive(&mut self, packets: &mut Vec<Packet>) -> io::Result<bool> {
-        let length = match self.device.recv(&mut self.buffer) {
+        let length = match self.device.read(&mut self.buffer) {
             Ok(length) => length,
             Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => return Ok(false),
             Err(error) => return Err(error),
@@ -93,8 +135,8 @@ impl Device for Tun {
     }
 
     fn send(&mut self, packets: &[Arc<Packet>]) -> (usize, Sent) {
-        let Some(which) = self.offloads else { return (1, Sent::of(self.device.send(packets[0].bytes()))) };
+        let Some(which) = self.offloads else { return (1, Sent::of(self.device.write(packets[0].bytes()))) };
         let count = join(packets, which, &mut self.head);
-        (count, Sent::of(self.device.send_vectored(&slices(&packets[..count], &self.head))))
+        (count, Sent::of(self.device.write_vectored(&slices(&packets[..count], &self.head))))
     }
 }

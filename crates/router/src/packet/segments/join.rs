@@ -18,9 +18,9 @@ const LONGEST: usize = 65_535;
 /// Packets in a segment, at most. Linux joins as many UDP datagrams; TCP packets of a usual size reach the longest length first.
 const MOST: usize = 64;
 
-/// Kinds of packets to join.
+/// Kinds of packets that a device takes joined to segments.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Join {
+pub enum Join {
     /// TCP only: before version 6.2, Linux takes no UDP segments.
     Tcp,
     /// TCP and UDP.

@@ -15,7 +15,8 @@ mod tests;
 use cohaptic_linkfile::router::Protocol;
 
 pub(crate) use cut::cut;
-pub(crate) use join::{Join, join, slices};
+pub use join::Join;
+pub(crate) use join::{join, slices};
 
 /// Header before each packet or segment of a device: `struct virtio_net_hdr` (Virtual I/O Device 1.2, section 5.1.6), in the byte order of the machine.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
