@@ -27,6 +27,19 @@ fn without_linux(command: &str) -> Failure {
 }
 
 #[cfg(not(target_os = "linux"))]
+pub(crate) mod exec {
+    use std::process::ExitCode;
+
+    use crate::arguments::ExecArguments;
+    use crate::failure::Failure;
+    use crate::report;
+
+    pub(crate) fn exec(_: &ExecArguments) -> ExitCode {
+        report::report(&Failure::System("cohaptic exec needs Linux: its namespaces and devices are those of Linux".to_owned()))
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
 stand_in! {
     without_linux;
     falcon: FalconArguments,

@@ -15,6 +15,8 @@ pub(crate) const EXPECTATION: u8 = 1;
 pub(crate) const BAD_INPUT: u8 = 2;
 /// Exit status for an error of input or output.
 pub(crate) const INPUT_OUTPUT: u8 = 3;
+/// Exit status of `exec` if this program failed, and not its command, by the convention of `env` and `timeout`.
+pub(crate) const EXEC_FAILED: u8 = 125;
 /// Exit status of an interrupted command, by the convention of shells: 128 plus the number of SIGINT.
 pub(crate) const INTERRUPTED: u8 = 130;
 /// Exit status if the reader closed standard output, by the convention of shells: 128 plus the number of SIGPIPE.

@@ -17,6 +17,8 @@ mod completions;
 mod document_schema;
 #[cfg(not(all(target_os = "linux", feature = "falcon")))]
 mod elsewhere;
+#[cfg(target_os = "linux")]
+mod exec;
 mod expectations;
 mod explain;
 mod facade;
@@ -59,22 +61,37 @@ use arguments::{Arguments, Command};
 #[cfg(not(all(target_os = "linux", feature = "falcon")))]
 use elsewhere::falcon;
 #[cfg(not(target_os = "linux"))]
-use elsewhere::{join, live, play, relay, router};
+use elsewhere::{exec, join, live, play, relay, router};
 
 fn main() -> ExitCode {
+    // A process of `exec` inside its namespaces has arguments of its own, and must not have a second thread.
+    #[cfg(target_os = "linux")]
+    if let Some(ended) = cohaptic_exec::run_inside() {
+        return ended;
+    }
     // `--json` is looked for before the arguments are parsed, because a refused argument is answered with a document too. Words after `--` are no options.
     if std::env::args_os().skip(1).take_while(|argument| argument != "--").any(|argument| argument == "--json") {
         output::want_json();
     }
     let arguments = match Arguments::of(std::env::args_os()) {
         Ok(arguments) => arguments,
-        Err(error) => return report::wrong_usage(&report::visible(error)),
+        Err(error) => {
+            let is_fault = error.use_stderr();
+            let status = report::wrong_usage(&report::visible(error));
+            // `exec` has the status of its command, so that each failure of its own has one and the same status.
+            let is_of_exec =
+                std::env::args_os().skip(1).find(|argument| !argument.as_encoded_bytes().starts_with(b"-")).is_some_and(|name| name == "exec");
+            return if is_fault && is_of_exec { ExitCode::from(failure::EXEC_FAILED) } else { status };
+        }
     };
     if arguments.quiet {
         output::be_quiet();
     }
-    // After the parsing of arguments: until here Ctrl-C ends the program at once, and nothing has been begun.
-    interrupt::listen();
+    // Signals belong to the command that `exec` runs, so that this program does not listen to them. After the parsing of arguments: until here Ctrl-C ends the
+    // program at once, and nothing has been begun.
+    if !matches!(arguments.command, Command::Exec(_)) {
+        interrupt::listen();
+    }
     let done = match arguments.command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Check(arguments) => check::check(&arguments),
@@ -89,6 +106,7 @@ fn main() -> ExitCode {
         Command::Study(arguments) => study::study(&arguments),
         Command::Relay(arguments) => relay::relay(&arguments),
         Command::Router(arguments) => router::router(&arguments),
+        Command::Exec(arguments) => return exec::exec(&arguments),
         Command::Tokio(arguments) => facade::tokio(&arguments),
         Command::Test(arguments) => facade::test(&arguments),
         Command::Falcon(arguments) => falcon::falcon(&arguments),

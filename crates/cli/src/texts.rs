@@ -19,6 +19,7 @@ pub(crate) fn schema(arguments: &SchemaArguments) -> Result<ExitCode, Failure> {
         FileKind::Scene => FileSchema::Scene.json(),
         FileKind::Relay => FileSchema::Relay.json(),
         FileKind::Router => FileSchema::Router.json(),
+        FileKind::Exec => FileSchema::Exec.json(),
         FileKind::Study => json_schema(&cohaptic_study::ROOT, "cohaptic study file"),
     };
     output::raw(format!("{schema}\n").as_bytes())?;

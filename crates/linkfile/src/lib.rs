@@ -1,9 +1,9 @@
-//! Link, relay and router files: from TOML text to checked links.
+//! Link, relay, router and exec files: from TOML text to checked links.
 //!
 //! Use this crate if your program reads links from files, or from words such as `delay=24ms`.
 //!
 //! A link is a table of keys, such as `{ delay = "24ms", loss = "1%" }`. This crate reads the keys of a link, the links between named ends, the file of a
-//! relay ([`RelayFile`]) and the file of a router ([`router::RouterFile`]). Every refusal is a [`FileError`] that names file, line, column and key, shows
+//! relay ([`RelayFile`]), the file of a router ([`router::RouterFile`]) and the file of hosts with commands ([`ExecFile`]). Every refusal is a [`FileError`] that names file, line, column and key, shows
 //! the line, and says what was expected.
 //!
 //! This crate knows nothing of haptics. `cohaptic-scene` reads the other parts of a scene with the same [`reading::TableReader`] from the same
@@ -24,6 +24,7 @@
 
 mod address;
 pub mod document;
+mod exec;
 mod fingerprint;
 /// Library of links with a name: each link with the sources of its numbers, the way from the sources to the numbers, and what is not modelled.
 pub mod library {
@@ -39,6 +40,7 @@ pub mod schema;
 
 pub use address::{AddressError, address};
 pub use document::error::{Diagnostic, FileError};
+pub use exec::{ExecFile, ExecHost};
 pub use fingerprint::{Fingerprint, FingerprintError};
 pub use mesh::link_keys::{KeysOfLinks, LinkKeys, link_from_keys};
 pub use mesh::link_table::{LinkChange, LinkTable};

@@ -16,6 +16,15 @@ pub(super) fn after(examples: &[&str]) -> String {
     text
 }
 
+/// Returns the examples of `exec`, and the meanings of the exit status, which is that of the command.
+pub(super) fn of_exec() -> String {
+    after(EXEC).replace(
+        EXIT_STATUS,
+        "Exit status: that of the command, 128 plus the number of the signal that ended it, 125 if cohaptic failed, 126 if the command cannot be executed, \
+        127 if it is not found.",
+    )
+}
+
 /// Commands of other programs that make files for `fit`, after the examples.
 const MEASUREMENTS: &str = "\
 Programs whose files are read, and the command that makes a good measurement:
@@ -33,7 +42,7 @@ pub(super) fn after_measurements(examples: &[&str]) -> String {
 
 /// Returns the examples of the program, the meanings of the exit status, and on systems other than Linux the commands that need Linux.
 pub(super) fn of_program() -> String {
-    let needs = if cfg!(target_os = "linux") { "" } else { "\n\nThese commands need Linux: falcon, live, play, relay, router." };
+    let needs = if cfg!(target_os = "linux") { "" } else { "\n\nThese commands need Linux: exec, falcon, live, play, relay, router." };
     after(PROGRAM) + needs
 }
 
@@ -131,6 +140,13 @@ pub(super) const RELAY: &[&str] = &[
 
 pub(super) const ROUTER: &[&str] =
     &["cohaptic router router.toml --control", "cohaptic router router.toml --set links.wan.delay=8ms --set router.seed=7 --for 1min"];
+
+const EXEC: &[&str] = &[
+    "cohaptic exec 'delay 50ms loss 1%' -- curl http://host:8000/",
+    "cohaptic exec 'delay 50ms loss 1%' --back 'delay 50ms rate 10mbit' -- python3 client.py",
+    "cohaptic exec 'delay 20ms 5ms' --listen 8080 -- node server.js",
+    "cohaptic exec net.toml --set link.loss=5% --out out",
+];
 
 pub(super) const TOKIO: &[&str] = &["cohaptic tokio", "cohaptic tokio --sim tests/network"];
 

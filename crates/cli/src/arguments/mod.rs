@@ -2,6 +2,7 @@
 
 mod compare;
 mod examples;
+mod exec;
 mod existing;
 mod falcon;
 mod join;
@@ -24,6 +25,7 @@ use clap::{Args, Parser, Subcommand};
 use cohaptic_picture::{Size, SizeError};
 
 pub(crate) use compare::{CompareArguments, PresetName};
+pub(crate) use exec::ExecArguments;
 pub(crate) use existing::{TestArguments, TokioArguments};
 pub(crate) use falcon::{
     FalconArguments, FalconCommand, Force, HandName, HomeArguments, ProbeArguments, SimulateArguments, WatchArguments, WhichFalcon,
@@ -81,6 +83,8 @@ pub(crate) enum Command {
     Relay(RelayArguments),
     /// Puts the emulator between two network devices: any IP traffic
     Router(RouterArguments),
+    /// Runs a program in any language in a network of its own, whose packets pass an emulated link to the real world
+    Exec(ExecArguments),
     /// Writes a package that stands in for tokio, so that programs run on the test kit unchanged, with their dependencies
     Tokio(TokioArguments),
     /// Runs cargo test with the package of cohaptic tokio in the place of tokio, and leaves Cargo.lock as it was
@@ -95,7 +99,7 @@ pub(crate) enum Command {
     Paper(PaperArguments),
     /// Writes a scene to begin with, in which every key is explained
     Init(InitArguments),
-    /// Prints a JSON Schema of scenes, relay files, router files or study files: names, meanings, units and defaults of all keys, for editors
+    /// Prints a JSON Schema of scenes, relay files, router files, exec files or study files: names, meanings, units and defaults of all keys, for editors
     Schema(SchemaArguments),
     /// Prints completions for a shell
     Completions(CompletionsArguments),

@@ -45,6 +45,8 @@ pub(crate) enum FileKind {
     Relay,
     /// Router files: for router
     Router,
+    /// Files of hosts with commands: for exec
+    Exec,
     /// Study files: for study
     Study,
 }

@@ -96,6 +96,7 @@ fn offers(asked: &Asked<'_>) -> Vec<Offer> {
             let kind = match asked.command {
                 "relay" => FileSchema::Relay,
                 "router" => FileSchema::Router,
+                "exec" => FileSchema::Exec,
                 _ => FileSchema::Scene,
             };
             let offers = keys::offers(kind.root(), &document(asked.file), typed);

@@ -19,6 +19,7 @@ fn help_names_the_commands() {
             "study",
             "relay",
             "router",
+            "exec",
             "link",
             "fit",
             "paper",

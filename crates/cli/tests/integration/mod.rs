@@ -21,6 +21,7 @@ mod documents;
 mod driverless;
 mod errors;
 #[cfg(unix)]
+mod exec;
 mod existing;
 mod explain;
 #[cfg(feature = "falcon")]

@@ -58,10 +58,14 @@ impl Running {
         (address.parse().unwrap(), purpose.to_owned())
     }
 
+    /// Returns the number of the process.
+    pub(crate) fn id(&self) -> String {
+        self.child.as_ref().unwrap().id().to_string()
+    }
+
     /// Sends a signal, waits for the end of the command, and returns its outcome.
     pub(crate) fn end_by(self, signal: &str) -> Outcome {
-        let id = self.child.as_ref().unwrap().id().to_string();
-        assert!(Command::new("kill").args([signal, &id]).status().unwrap().success());
+        assert!(Command::new("kill").args([signal, &self.id()]).status().unwrap().success());
         self.end()
     }
 

@@ -12,6 +12,7 @@ pub mod link {
     pub use crate::link::keys::*;
 }
 
+pub use crate::exec::ROOT as EXEC;
 pub use crate::relay::ROOT as RELAY;
 pub use crate::router::read::ROOT as ROUTER;
 pub use cohaptic_wan::parameters::{Choices, Form, Key, Need, Table, Words, joined, number, optional, required, somewhere, usual, vector, words};

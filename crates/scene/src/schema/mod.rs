@@ -15,11 +15,13 @@ pub enum FileSchema {
     Relay,
     /// A router file, for `cohaptic router`.
     Router,
+    /// A file of hosts with commands, for `cohaptic exec`.
+    Exec,
 }
 
 impl FileSchema {
     /// Every kind of file.
-    pub const ALL: [Self; 3] = [Self::Scene, Self::Relay, Self::Router];
+    pub const ALL: [Self; 4] = [Self::Scene, Self::Relay, Self::Router, Self::Exec];
 
     /// Returns the keys at the top level of a file of this kind.
     #[must_use]
@@ -28,6 +30,7 @@ impl FileSchema {
             Self::Scene => &crate::read::ROOT,
             Self::Relay => &schema::RELAY,
             Self::Router => &schema::ROUTER,
+            Self::Exec => &schema::EXEC,
         }
     }
 
@@ -38,6 +41,7 @@ impl FileSchema {
             Self::Scene => "cohaptic scene",
             Self::Relay => "cohaptic relay file",
             Self::Router => "cohaptic router file",
+            Self::Exec => "cohaptic exec file",
         }
     }
 

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use cohaptic_linkfile::RelayFile;
 use cohaptic_linkfile::router::RouterFile;
+use cohaptic_linkfile::{ExecFile, RelayFile};
 
 use crate::schema::FileSchema;
 use crate::{Scene, SceneError, scene_files};
@@ -150,6 +150,14 @@ const ROUTER: [&str; 2] = [
     "router.default = \"pass\"\nrouter.memory = {}\nleft.interface = \"eth1\"\nright.interface = \"eth2\"\n",
 ];
 
+const EXEC: &str = r#"
+    exec = { world = "internet" }
+    hosts = [{ name = "server", command = ["sleep", "1"], ready = "listening" }, { name = "client", command = "curl http://server/", main = true }]
+    modulators = [{ name = "cell", states = [{ name = "good", sojourn = "1s" }, { name = "bad", sojourn = "1s" }] }]
+    link = { delay = "20ms" }
+    links = [{ from = "client", to = "internet", loss = "1%" }]
+"#;
+
 /// A text of a kind of file, and the path under which the text is read.
 pub(super) struct Sample {
     pub(super) kind: FileSchema,
@@ -166,6 +174,7 @@ pub(super) fn samples() -> Vec<Sample> {
     let of = |kind, text: &str| Sample { kind, path: root().join("scenarios/network/sample.toml"), text: text.to_owned() };
     let mut samples: Vec<Sample> = SCENES.iter().map(|text| of(FileSchema::Scene, text)).collect();
     samples.push(of(FileSchema::Relay, RELAY));
+    samples.push(of(FileSchema::Exec, EXEC));
     samples.extend(ROUTER.iter().map(|text| of(FileSchema::Router, text)));
     let mut files = scene_files(&root().join("scenarios")).unwrap();
     files.push(root().join("crates/scene/tests/integration/data/every-key.toml"));
@@ -179,6 +188,7 @@ pub(super) fn read(sample: &Sample, overrides: &[String]) -> Result<String, Scen
     match sample.kind {
         FileSchema::Scene => Scene::parse(text, path, overrides).map(|scene| format!("{scene:?}")),
         FileSchema::Relay => RelayFile::parse(text, path, overrides).map(|relay| format!("{relay:?}")),
+        FileSchema::Exec => ExecFile::parse(text, path, overrides).map(|exec| format!("{exec:?}")),
         FileSchema::Router => RouterFile::parse(text, path, overrides).map(|router| {
             // The models of the links, not their keys as written, which a router keeps for live control.
             let links: Vec<_> = router.links.iter().map(|link| (&link.name, &link.model)).collect();

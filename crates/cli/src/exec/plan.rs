@@ -1,0 +1,116 @@
+//! Plans of `cohaptic exec`: of a single command, and of a file.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use cohaptic_exec::{GATEWAY, GatewayPlan, HostPlan, NAMES, PREFIX, Plan, Setup, host};
+use cohaptic_linkfile::router::Network;
+use cohaptic_linkfile::{ExecFile, LinkTable};
+use cohaptic_realtime::{Pacing, Tolerance, Wishes};
+use cohaptic_wan::LinkModel;
+
+use crate::arguments::ExecArguments;
+use crate::failure::Failure;
+use crate::input;
+use crate::link::link_and_keys;
+
+/// Name of the host of a single command, in the names of links and files.
+const COMMAND: &str = "command";
+/// Name of the real world beyond the link of a single command.
+const WORLD: &str = "world";
+/// Name that stands for the loopback interface of the real machine.
+const MACHINE: &str = "host";
+
+/// Returns the plan of the arguments.
+pub(super) fn plan(arguments: &ExecArguments) -> Result<Plan, Failure> {
+    match (arguments.command.is_empty(), arguments.spec.as_slice()) {
+        (false, _) => of_command(arguments),
+        (true, [file]) if Path::new(file).exists() || input::is_standard_input(Path::new(file)) => of_file(arguments, Path::new(file)),
+        (true, spec) => Err(Failure::Input(format!(
+            "{:?} is not a file: expected a file of hosts, or a command after two dashes: cohaptic exec 'delay 50ms loss 1%' -- curl http://host:8000/",
+            spec.join(" ")
+        ))),
+    }
+}
+
+/// Returns the plan of a command between which and the real world lies the link.
+fn of_command(arguments: &ExecArguments) -> Result<Plan, Failure> {
+    let there = link(&arguments.spec)?;
+    let back = arguments.back.as_ref().map_or_else(|| Ok(there.clone()), |words| link(std::slice::from_ref(words)))?;
+    let gateway = GatewayPlan { listen: arguments.listen.clone(), ..gateway(arguments, WORLD) };
+    let command = HostPlan {
+        name: COMMAND.to_owned(),
+        setup: setup(0, None, Vec::new(), Some(&gateway)),
+        command: arguments.command.clone(),
+        is_main: true,
+        ready: None,
+        is_piped: false,
+    };
+    let links = LinkTable::new(2, Arc::new(there), [((1, 0), Arc::new(back))]);
+    Ok(whole(arguments, vec![command], Some(gateway), links))
+}
+
+/// Returns the plan of a file.
+fn of_file(arguments: &ExecArguments, path: &Path) -> Result<Plan, Failure> {
+    let file = input::with(path, |text, name| ExecFile::parse(text, name, &arguments.set))?;
+    let gateway = file.world.as_ref().map(|name| gateway(arguments, name));
+    let hosts = file.hosts.iter().enumerate().map(|(place, of)| {
+        let others = file.hosts.iter().enumerate().filter(|(other, _)| *other != place);
+        let others = others.map(|(other, host)| (index(other), host.name.clone())).collect();
+        HostPlan {
+            name: of.name.clone(),
+            setup: setup(index(place), Some(&of.name), others, gateway.as_ref()),
+            command: of.command.iter().map(Into::into).collect(),
+            is_main: of.is_main,
+            ready: of.ready.clone(),
+            is_piped: true,
+        }
+    });
+    let hosts = hosts.collect();
+    let plan = whole(arguments, hosts, gateway, file.links);
+    Ok(Plan { seed: arguments.seed.unwrap_or(file.seed), tolerance: Tolerance { limit: arguments.tolerance.unwrap_or(file.tolerance) }, ..plan })
+}
+
+/// Returns the index of a host as a part of its address. A file has few hosts.
+fn index(place: usize) -> u8 {
+    u8::try_from(place).unwrap_or(u8::MAX)
+}
+
+/// Returns the network and the names that a host sees.
+fn setup(place: u8, name: Option<&str>, others: Vec<(u8, String)>, gateway: Option<&GatewayPlan>) -> Setup {
+    let network = |(address, prefix)| Network::new(address, prefix);
+    let machine = gateway.map(|_| (GATEWAY[0], MACHINE.to_owned()));
+    Setup {
+        name: name.map(str::to_owned),
+        addresses: host(place).into_iter().zip(PREFIX).filter_map(network).collect(),
+        hosts: machine.into_iter().chain(others.into_iter().map(|(other, name)| (host(other)[0], name))).collect(),
+        name_server: gateway.and_then(|gateway| gateway.name_server).map(|_| NAMES[0]),
+    }
+}
+
+fn gateway(arguments: &ExecArguments, name: &str) -> GatewayPlan {
+    GatewayPlan { name: name.to_owned(), name_server: arguments.dns.or_else(cohaptic_exec::name_server), listen: Vec::new() }
+}
+
+/// Returns the plan with what the options say for all kinds.
+fn whole(arguments: &ExecArguments, hosts: Vec<HostPlan>, gateway: Option<GatewayPlan>, links: LinkTable) -> Plan {
+    Plan {
+        seed: arguments.seed.unwrap_or(0),
+        hosts,
+        gateway,
+        links,
+        pacing: if arguments.spin { Pacing::SPIN } else { Pacing::Sleep },
+        wishes: if arguments.no_priority { Wishes::NONE } else { Wishes::default() },
+        tolerance: Tolerance { limit: arguments.tolerance.unwrap_or(Duration::from_millis(1)) },
+        captures: arguments.out.clone(),
+    }
+}
+
+/// Returns the link in words or keys. Words may come in one argument or in several: `'delay 50ms loss 1%'`.
+fn link(spec: &[String]) -> Result<LinkModel, Failure> {
+    // A key has an equals sign, and its value may have spaces.
+    let words =
+        spec.iter().flat_map(|text| if text.contains('=') { vec![text.clone()] } else { text.split_whitespace().map(str::to_owned).collect() });
+    link_and_keys(&words.collect::<Vec<_>>()).map(|(model, _)| model)
+}

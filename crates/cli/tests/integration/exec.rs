@@ -1,0 +1,519 @@
+//! `cohaptic exec`, with real commands in namespaces. On a system that allows no namespaces, the tests are skipped with a message.
+#![expect(clippy::print_stdout, reason = "a test that is skipped says why, and a command says what it has seen")]
+
+use std::env;
+use std::fs;
+use std::io::{ErrorKind, Read as _, Write as _};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream, ToSocketAddrs as _, UdpSocket};
+use std::os::unix::process::CommandExt as _;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use crate::integration::desk::{Desk, Outcome};
+use crate::integration::running::{PATIENCE, Running};
+
+/// Variable that tells a process inside what to do.
+const ROLE: &str = "COHAPTIC_CLI_TEST_EXEC";
+
+/// Returns whether namespaces and devices can be made here, and says why not.
+fn can_run() -> bool {
+    let can = Command::new("unshare").args(["-Urnm", "true"]).stderr(Stdio::null()).status().is_ok_and(|status| status.success());
+    if !can {
+        println!("skipped: this system allows no namespaces (`unshare -Urnm true` fails)");
+        return false;
+    }
+    if let Err(error) = fs::OpenOptions::new().read(true).write(true).open("/dev/net/tun") {
+        println!("skipped: /dev/net/tun cannot be opened: {error}");
+        return false;
+    }
+    true
+}
+
+/// Returns `cohaptic exec OPTIONS -- ` with this test program as the command, in a role of [`be_inside`].
+fn with_role(desk: &Desk, options: &str, role: &str) -> Command {
+    let mut command = desk.command(&format!("exec {options} --no-priority --"));
+    command.arg(env::current_exe().unwrap()).args(["integration::exec::be_inside", "--exact", "--nocapture"]).env(ROLE, role);
+    command
+}
+
+/// Runs the command inside to its end, and returns what it says.
+fn said_by(desk: &Desk, options: &str, role: &str) -> Vec<String> {
+    let outcome = Running::begin(with_role(desk, options, role)).end();
+    assert_eq!(outcome.status, Some(0), "{role}: {}\n{}", outcome.stdout, outcome.stderr);
+    outcome.stdout.lines().filter_map(|line| line.split_once("inside: ")).map(|(_, said)| said.to_owned()).collect()
+}
+
+/// Command inside, as a test that does nothing unless its process has a role.
+#[test]
+fn be_inside() {
+    let Ok(role) = env::var(ROLE) else { return };
+    let words: Vec<&str> = role.split(' ').collect();
+    match words.as_slice() {
+        // Connects, sends data, ends its half, and reads what comes back.
+        ["echo", to, length] => {
+            let data: Vec<u8> = (0..length.parse().unwrap()).map(|place: u32| u8::try_from(place % 251).unwrap()).collect();
+            let begin = Instant::now();
+            let mut stream = TcpStream::connect(*to).unwrap();
+            println!("inside: {}", begin.elapsed().as_millis());
+            let mut sender = stream.try_clone().unwrap();
+            let sent = data.clone();
+            let sending = thread::spawn(move || {
+                sender.write_all(&sent).unwrap();
+                sender.shutdown(Shutdown::Write).unwrap();
+            });
+            let mut back = Vec::new();
+            stream.read_to_end(&mut back).unwrap();
+            sending.join().unwrap();
+            println!("inside: {}", if back == data { "the same" } else { "something else" });
+        }
+        ["refused", to] => {
+            let tcp = TcpStream::connect(*to).unwrap_err();
+            let udp = UdpSocket::bind("0.0.0.0:0").unwrap();
+            udp.connect(*to).unwrap();
+            udp.set_read_timeout(Some(PATIENCE)).unwrap();
+            udp.send(b"question").unwrap();
+            let udp = udp.recv(&mut [0; 64]).unwrap_err();
+            println!("inside: {:?} {:?}", tcp.kind(), udp.kind());
+        }
+        ["ask", to] => {
+            let udp = UdpSocket::bind("0.0.0.0:0").unwrap();
+            udp.connect(*to).unwrap();
+            udp.set_read_timeout(Some(PATIENCE)).unwrap();
+            let begin = Instant::now();
+            udp.send(b"question").unwrap();
+            let mut answer = [0; 64];
+            let length = udp.recv(&mut answer).unwrap();
+            println!("inside: {} {}", String::from_utf8_lossy(&answer[..length]), begin.elapsed().as_millis());
+        }
+        ["tell", to] => {
+            UdpSocket::bind("0.0.0.0:0").unwrap().send_to(b"farewell", *to).unwrap();
+        }
+        ["look-up", name] => {
+            let found: Vec<String> = (*name, 80).to_socket_addrs().unwrap().map(|address| address.ip().to_string()).collect();
+            println!("inside: {}", found.join(" "));
+        }
+        // Echoes one connection and one datagram.
+        ["serve", port] => {
+            let (tcp, udp) = (TcpListener::bind(format!("0.0.0.0:{port}")).unwrap(), UdpSocket::bind(format!("0.0.0.0:{port}")).unwrap());
+            eprintln!("ready");
+            let (mut stream, _) = tcp.accept().unwrap();
+            let mut data = Vec::new();
+            stream.read_to_end(&mut data).unwrap();
+            stream.write_all(&data).unwrap();
+            drop(stream);
+            let mut datagram = [0; 64];
+            udp.set_read_timeout(Some(PATIENCE)).unwrap();
+            let (length, from) = udp.recv_from(&mut datagram).unwrap();
+            udp.send_to(&datagram[..length], from).unwrap();
+        }
+        _ => panic!("no role {role}"),
+    }
+}
+
+/// A server of the real machine that sends back what each connection brings.
+fn echo_server() -> SocketAddr {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    thread::spawn(move || {
+        while let Ok((mut stream, _)) = listener.accept() {
+            thread::spawn(move || {
+                let mut reader = stream.try_clone().unwrap();
+                let _ = std::io::copy(&mut reader, &mut stream);
+                let _ = stream.shutdown(Shutdown::Write);
+            });
+        }
+    });
+    address
+}
+
+/// A connection crosses the link in both directions: the handshake takes a round trip, all data arrives in spite of the losses, and each half ends by itself.
+#[test]
+fn a_connection_reaches_a_server_of_the_machine_through_the_link() {
+    if !can_run() {
+        return;
+    }
+    let (desk, server) = (Desk::new(), echo_server());
+    for name in ["host", "10.0.2.2"] {
+        let said = said_by(&desk, "'delay 30ms loss 1%'", &format!("echo {name}:{} 300000", server.port()));
+        let handshake: u64 = said[0].parse().unwrap();
+        // A lost SYN is sent again after a second.
+        assert!(handshake >= 60, "{said:?}");
+        assert_eq!(said[1], "the same");
+    }
+}
+
+#[test]
+fn a_port_without_a_program_refuses() {
+    if !can_run() {
+        return;
+    }
+    let desk = Desk::new();
+    // Both kinds of sockets hold the port, so that no other test gets it, and neither listens.
+    let port = {
+        let udp = UdpSocket::bind("127.0.0.1:0").unwrap();
+        udp.local_addr().unwrap().port()
+    };
+    assert_eq!(said_by(&desk, "'delay 1ms'", &format!("refused host:{port}")), ["ConnectionRefused ConnectionRefused"]);
+}
+
+#[test]
+fn datagrams_go_out_and_answers_come_back_and_a_farewell_arrives_after_the_end() {
+    if !can_run() {
+        return;
+    }
+    let desk = Desk::new();
+    let server = UdpSocket::bind("127.0.0.1:0").unwrap();
+    server.set_read_timeout(Some(PATIENCE)).unwrap();
+    let port = server.local_addr().unwrap().port();
+    let answering = thread::spawn(move || {
+        let mut data = [0; 64];
+        let (length, from) = server.recv_from(&mut data).unwrap();
+        assert_eq!(&data[..length], b"question");
+        server.send_to(b"answer", from).unwrap();
+        server
+    });
+    let said = said_by(&desk, "'delay 20ms'", &format!("ask host:{port}"));
+    let (answer, millis) = said[0].split_once(' ').unwrap();
+    assert!(answer == "answer" && millis.parse::<u64>().unwrap() >= 40, "{said:?}");
+    let server = answering.join().unwrap();
+    // The command ends at once, and its datagram is on the way for 300 ms.
+    said_by(&desk, "'delay 300ms'", &format!("tell host:{port}"));
+    let mut data = [0; 64];
+    let length = server.recv(&mut data).unwrap();
+    assert_eq!(&data[..length], b"farewell");
+}
+
+/// A name server of the machine answers through the link. Its answer is one address for every name.
+#[test]
+fn names_come_from_the_file_and_from_the_name_server() {
+    if !can_run() {
+        return;
+    }
+    if !Path::new("/etc/resolv.conf").exists() || !Path::new("/etc/hosts").exists() {
+        println!("skipped: this system has no /etc/resolv.conf or no /etc/hosts");
+        return;
+    }
+    let desk = Desk::new();
+    let server = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let address = server.local_addr().unwrap();
+    thread::spawn(move || {
+        let mut question = [0; 512];
+        while let Ok((length, from)) = server.recv_from(&mut question) {
+            let mut answer = question[..length].to_vec();
+            // The question without its additional records: the name ends with a zero, and four bytes follow.
+            let end = 12 + answer[12..].iter().position(|byte| *byte == 0).unwrap() + 5;
+            answer.truncate(end);
+            let is_v4 = answer[end - 4..end - 2] == [0, 1];
+            answer[2..12].copy_from_slice(&[0x81, 0x80, 0, 1, 0, u8::from(is_v4), 0, 0, 0, 0]);
+            if is_v4 {
+                // Name, type, class, time to live, length and address.
+                answer.extend([0xc0, 12, 0, 1, 0, 1, 0, 0, 0, 60, 0, 4, 192, 0, 2, 99]);
+            }
+            server.send_to(&answer, from).unwrap();
+        }
+    });
+    let options = format!("'delay 5ms' --dns {address}");
+    assert_eq!(said_by(&desk, &options, "look-up name.of.a.test"), ["192.0.2.99"]);
+    assert_eq!(said_by(&desk, &options, "look-up host"), ["10.0.2.2"]);
+    assert!(!fs::read_to_string("/etc/hosts").unwrap().contains("10.0.2.2\thost"), "the file of the machine has not changed");
+}
+
+#[test]
+fn the_gateway_answers_ping() {
+    let has_ping = Command::new("ping").arg("-V").stdout(Stdio::null()).status().is_ok_and(|status| status.success());
+    if !can_run() || !has_ping {
+        return;
+    }
+    let outcome = Desk::new().cohaptic("exec 'delay 10ms' --no-priority -- ping -c 2 -i 0.2 host");
+    assert_eq!(outcome.status, Some(0), "{outcome:?}");
+    assert!(outcome.stdout.contains("2 received"), "{}", outcome.stdout);
+}
+
+#[test]
+fn the_status_is_that_of_the_command() {
+    if !can_run() {
+        return;
+    }
+    let desk = Desk::new();
+    desk.write("no-program", "text");
+    for (line, status, part) in [
+        ("exec 'delay 1ms' -- true", 0, ""),
+        ("exec 'delay 1ms' -- sh -c 'exit 7'", 7, ""),
+        ("exec delay 1ms -- sh -c 'kill -9 $$'", 137, ""),
+        ("exec delay=1ms -- no-such-command", 127, "cohaptic exec: cannot run no-such-command: No such file or directory"),
+        ("exec 'delay 1ms' -- ./no-program", 126, "cohaptic exec: cannot run ./no-program: Permission denied"),
+        ("exec 'delay one' -- true", 125, "these words do not describe a link"),
+        ("exec 'delay 1ms' --listen 0 -- true", 125, "expected a port such as 8080"),
+        ("exec 'delay 1ms'", 125, "is not a file: expected a file of hosts, or a command after two dashes"),
+    ] {
+        let outcome = desk.cohaptic_within(PATIENCE, line);
+        assert_eq!(outcome.status, Some(status), "{line}: {outcome:?}");
+        assert!(outcome.stderr.contains(part) && (!part.is_empty() || outcome.stderr.is_empty()), "{line}: {}", outcome.stderr);
+    }
+    // Standard input and output are those of the command.
+    let mut command = desk.command("exec 'delay 1ms' -- tr a-z A-Z");
+    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    child.stdin.take().unwrap().write_all(b"words").unwrap();
+    assert_eq!(Outcome::of(child.wait_with_output().unwrap()).stdout, "WORDS");
+    // What the command leaves in the background ends with it, and the pipe with both.
+    assert_eq!(desk.cohaptic_within(PATIENCE, "exec 'delay 1ms' -- sh -c 'sleep 1000 & exit 3'").status, Some(3));
+}
+
+/// A signal reaches the command once, whether it was sent to the program alone or to its whole process group, as the terminal does on Ctrl-C.
+#[test]
+fn a_signal_reaches_the_command_once() {
+    if !can_run() {
+        return;
+    }
+    const COMMAND: &str = "exec 'delay 1ms' --no-priority -- sh -c 'trap \"echo interrupted >&2\" INT; echo ready >&2; while :; do sleep 0.1; done'";
+    let desk = Desk::new();
+    let mut command = desk.command(COMMAND);
+    // A group of its own, which leaves out the tests.
+    command.process_group(0);
+    let running = Running::begin(command);
+    running.said("ready");
+    for target in [running.id(), format!("-{}", running.id()), running.id()] {
+        assert!(Command::new("kill").args(["-INT", "--", &target]).status().unwrap().success());
+        running.said("interrupted");
+    }
+    // The shell ends by the signal, whose number the status has.
+    let outcome = running.end_by("-TERM");
+    assert_eq!(outcome.status, Some(143), "{outcome:?}");
+    assert_eq!(outcome.stderr.matches("interrupted").count(), 3, "{}", outcome.stderr);
+}
+
+/// The end of the program is the end of everything inside, however the program ends: a process left behind would hold the pipe open.
+#[test]
+fn nothing_is_left_when_the_program_is_killed() {
+    if !can_run() {
+        return;
+    }
+    let running = Running::begin(Desk::new().command("exec 'delay 1ms' --no-priority -- sh -c 'sleep 1000 & echo ready >&2; sleep 1000'"));
+    running.said("ready");
+    let begin = Instant::now();
+    assert_eq!(running.end_by("-KILL").status, None);
+    assert!(begin.elapsed() < PATIENCE);
+}
+
+#[test]
+fn a_port_of_the_machine_leads_inside() {
+    if !can_run() {
+        return;
+    }
+    let desk = Desk::new();
+    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let running = Running::begin(with_role(&desk, &format!("'delay 20ms' --listen {port}"), &format!("serve {port}")));
+    running.said("ready");
+    let begin = Instant::now();
+    let mut stream = TcpStream::connect(("127.0.0.1", port)).unwrap();
+    stream.write_all(b"to the inside").unwrap();
+    stream.shutdown(Shutdown::Write).unwrap();
+    let mut back = String::new();
+    stream.read_to_string(&mut back).unwrap();
+    // The handshake, and the question with its answer: two round trips.
+    assert!(back == "to the inside" && begin.elapsed() >= Duration::from_millis(80), "{back:?} after {:?}", begin.elapsed());
+    let udp = UdpSocket::bind("127.0.0.1:0").unwrap();
+    udp.connect(("127.0.0.1", port)).unwrap();
+    udp.set_read_timeout(Some(PATIENCE)).unwrap();
+    udp.send(b"datagram").unwrap();
+    let mut data = [0; 64];
+    let length = udp.recv(&mut data).unwrap();
+    assert_eq!(&data[..length], b"datagram");
+    assert_eq!(running.end().status, Some(0));
+    // A port that another program has is refused before anything begins.
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let outcome = desk.cohaptic(&format!("exec 'delay 1ms' --listen {} -- true", taken.local_addr().unwrap().port()));
+    assert!(outcome.status == Some(125) && outcome.stderr.contains("cannot listen at 127.0.0.1:"), "{outcome:?}");
+}
+
+#[test]
+fn a_client_is_refused_where_no_command_listens() {
+    if !can_run() {
+        return;
+    }
+    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let line = format!("exec 'delay 1ms' --no-priority --listen {port} -- sh -c 'echo ready >&2; sleep 1000'");
+    let running = Running::begin(Desk::new().command(&line));
+    running.said("ready");
+    let mut stream = TcpStream::connect(("127.0.0.1", port)).unwrap();
+    stream.set_read_timeout(Some(PATIENCE)).unwrap();
+    assert_eq!(stream.read(&mut [0]).unwrap_err().kind(), ErrorKind::ConnectionReset);
+    assert_eq!(running.end_by("-TERM").status, Some(143));
+}
+
+/// An ordinary user runs commands too, and stays the same user inside.
+#[test]
+fn an_ordinary_user_needs_no_root() {
+    if !can_run() {
+        return;
+    }
+    // A user without rights, in a view of files in which everybody may use the device.
+    const SCRIPT: &str = "mount -t tmpfs tmpfs /dev/net && mknod -m 666 /dev/net/tun c 10 200 && \
+        exec setpriv --reuid 65534 --regid 65534 --clear-groups --inh-caps=-all \"$@\"";
+    let script = |words: &[&str]| {
+        let mut command = Command::new("unshare");
+        command.args(["-m", "sh", "-c", SCRIPT, "sh"]).args(words).stdin(Stdio::null());
+        Outcome::of(command.output().unwrap())
+    };
+    let desk = Desk::new();
+    let program = desk.path("cohaptic");
+    // The build's own folder may be closed to others.
+    fs::copy(env!("CARGO_BIN_EXE_cohaptic"), &program).unwrap();
+    desk.set_mode("cohaptic", 0o755);
+    desk.set_mode(".", 0o755);
+    let program = program.to_str().unwrap();
+    if script(&["test", "-x", program, "-a", "-w", "/dev/net/tun"]).status != Some(0) || script(&["unshare", "-Urnm", "true"]).status != Some(0) {
+        println!("skipped: this test needs root, to become an ordinary user who may have namespaces");
+        return;
+    }
+    let server = echo_server();
+    let fetch = format!(
+        "id -u; id -g; cat /proc/1/comm; exec 3<>/dev/tcp/10.0.2.2/{}; echo hello >&3; head -n 1 <&3; ping -c 1 host >/dev/null && echo pong",
+        server.port()
+    );
+    let outcome = script(&[program, "exec", "delay 5ms", "--no-priority", "--", "bash", "-c", &fetch]);
+    assert_eq!((outcome.status, outcome.stdout.as_str()), (Some(0), "65534\n65534\ncohaptic\nhello\npong\n"), "{outcome:?}");
+}
+
+#[test]
+fn a_system_without_namespaces_is_told_which_setting_is_in_the_way() {
+    if !can_run() {
+        return;
+    }
+    // A user namespace in which no further one may be made, and a process without rights in it.
+    const SCRIPT: &str = "echo 0 > /proc/sys/user/max_user_namespaces && exec setpriv --bounding-set=-all --inh-caps=-all \"$@\"";
+    let mut command = Command::new("unshare");
+    let exec = Desk::new().command("exec 'delay 1ms' -- true");
+    command.args(["-Ur", "sh", "-c", SCRIPT, "sh"]).arg(exec.get_program()).args(exec.get_args());
+    let outcome = Outcome::of(command.output().unwrap());
+    assert_eq!(outcome.status, Some(125), "{outcome:?}");
+    for part in ["cohaptic exec: cannot make namespaces: ", "sysctl -w user.max_user_namespaces=", "cohaptic relay"] {
+        assert!(outcome.stderr.contains(part), "no {part:?} in {}", outcome.stderr);
+    }
+}
+
+#[test]
+fn the_folder_gets_a_capture_and_a_report() {
+    if !can_run() {
+        return;
+    }
+    let (desk, server) = (Desk::new(), echo_server());
+    said_by(&desk, "'delay 5ms' --out out", &format!("echo host:{} 5000", server.port()));
+    assert_eq!(desk.files("out").iter().filter(|name| !name.starts_with('.')).collect::<Vec<_>>(), ["command.pcapng", "report.txt"]);
+    let report = desk.read("out/report.txt");
+    for part in ["ended with status 0", "the run is ", "  command -> world: ", "  world -> command: ", "mean delay 5.0"] {
+        assert!(report.contains(part), "no {part:?} in {report}");
+    }
+    let capture = fs::read(desk.path("out/command.pcapng")).unwrap();
+    assert_eq!(capture[..4], [0x0a, 0x0d, 0x0d, 0x0a]);
+    let has = |text: &[u8]| capture.windows(text.len()).any(|part| part == text);
+    // The header of a packet from the command to the gateway, and back.
+    assert!(has(b"sent") && has(b"delivered after 5ms") && has(&[10, 0, 2, 15, 10, 0, 2, 2]) && has(&[10, 0, 2, 2, 10, 0, 2, 15]));
+}
+
+/// A file with a server and a client, whose further keys and commands are given.
+fn net(server: &str, client: &str) -> String {
+    format!("[[hosts]]\nname = \"server\"\n{server}\n[[hosts]]\nname = \"client\"\n{client}\n[link]\ndelay = \"10ms\"\n")
+}
+
+/// Returns the key `command` with this test program, in a role of [`be_inside`].
+fn command_in_role(role: &str) -> String {
+    let program = env::current_exe().unwrap();
+    format!("command = \"{ROLE}='{role}' exec {} integration::exec::be_inside --exact --nocapture\"", program.display())
+}
+
+/// Hosts of a file find each other by name, start in order, and have their names before their lines.
+#[test]
+fn hosts_of_a_file_speak_over_their_links() {
+    if !can_run() {
+        return;
+    }
+    let desk = Desk::new();
+    let server = command_in_role("serve 80") + "\nready = \"ready\"";
+    let client = "command = \"hostname; ping -c 1 -W 60 server >/dev/null && echo pong; exec 3<>/dev/tcp/server/80\"";
+    // A shell without /dev/tcp is of no use here, so the client is this program too.
+    let client = client.replace("exec 3<>/dev/tcp/server/80", "true")
+        + "\n[[hosts]]\nname = \"other\"\n"
+        + &command_in_role("echo server:80 3000")
+        + "\nmain = true";
+    desk.write("net.toml", net(&server, &client));
+    let outcome = desk.cohaptic_within(PATIENCE, "exec net.toml --no-priority --set links.other.server.delay=40ms --out out");
+    assert_eq!(outcome.status, Some(0), "{outcome:?}");
+    let said: Vec<&str> =
+        outcome.stdout.lines().filter_map(|line| line.strip_prefix("other | ")?.split_once("inside: ")).map(|(_, said)| said).collect();
+    assert!(said[0].parse::<u64>().unwrap() >= 50 && said[1] == "the same", "{outcome:?}");
+    assert!(outcome.stdout.contains("client | client\n"), "{outcome:?}");
+    assert!(outcome.stderr.contains("server | ready\n"), "{outcome:?}");
+    assert_eq!(desk.files("out").iter().filter(|name| !name.starts_with('.')).count(), 4);
+    let report = desk.read("out/report.txt");
+    // The server waited for a datagram that never came, so that it was asked to end.
+    for part in ["server: sh -c ", "other: sh -c ", "ended with status 0", "ended with status 143", "  other -> server: ", "mean delay 40.0"] {
+        assert!(report.contains(part), "no {part:?} in {report}");
+    }
+}
+
+#[test]
+fn the_main_host_or_the_first_failure_decides_the_status() {
+    if !can_run() {
+        return;
+    }
+    let desk = Desk::new();
+    for (server, client, status) in [
+        ("command = \"exit 3\"", "command = \"sleep 0.3; exit 4\"\nmain = true", 4),
+        ("command = \"sleep 0.3; exit 5\"", "command = \"exit 0\"", 5),
+        ("command = \"exit 0\"", "command = [\"true\"]", 0),
+        ("command = \"sleep 1000\"", "command = \"exit 6\"", 6),
+        // A host that fails before it is ready lets the others start, and its status counts.
+        ("command = \"exit 7\"\nready = \"never\"", "command = \"sleep 1000\"", 7),
+        ("command = [\"no-such-command\"]", "command = \"sleep 1000\"", 127),
+    ] {
+        desk.write("net.toml", net(server, client));
+        let outcome = desk.cohaptic_within(PATIENCE, "exec net.toml --no-priority");
+        assert_eq!(outcome.status, Some(status), "{server} {client}: {outcome:?}");
+    }
+    // A command that does not end by SIGTERM is killed after 5 s.
+    desk.write("net.toml", net("command = \"trap '' TERM; while :; do sleep 1; done\"", "command = \"sleep 0.2\"\nmain = true"));
+    let begin = Instant::now();
+    assert_eq!(desk.cohaptic_within(PATIENCE, "exec net.toml --no-priority").status, Some(0));
+    assert!(begin.elapsed() >= Duration::from_secs(5));
+}
+
+/// With a world, hosts of a file reach the real machine over the links to the world.
+#[test]
+fn a_file_may_have_the_real_world() {
+    if !can_run() {
+        return;
+    }
+    let (desk, server) = (Desk::new(), echo_server());
+    let host = command_in_role(&format!("echo host:{} 3000", server.port()));
+    desk.write(
+        "net.toml",
+        format!(
+            "[exec]\nworld = \"internet\"\n[[hosts]]\nname = \"client\"\n{host}\n[[links]]\nfrom = \"client\"\nto = \"internet\"\ndelay = \"30ms\"\n"
+        ),
+    );
+    let outcome = desk.cohaptic_within(PATIENCE, "exec net.toml --no-priority");
+    assert!(outcome.status == Some(0) && outcome.stdout.contains("inside: the same"), "{outcome:?}");
+}
+
+#[test]
+fn a_bad_file_is_refused_with_its_place() {
+    let desk = Desk::new();
+    for (text, parts) in [
+        (net("command = \"true\"", "command = \"\""), &["net.toml:6:11: hosts.1.command: there is no command: expected a line for sh"][..]),
+        (net("command = \"true\"", "command = [\"true\", 1]"), &["hosts.1.command.1", "a word of the command"]),
+        (net("command = \"true\"", "command = \"true\"").replace("\"client\"", "\"server\""), &["there is a host \"server\" already"]),
+        (net("command = \"true\"", "command = \"true\"").replace("\"client\"", "\"host\""), &["\"host\" cannot be the name of a host"]),
+        (net("command = \"true\"\nmain = true", "command = \"true\"\nmain = true"), &["host \"server\" is the main one already"]),
+        (net("command = \"true\"\nready = \"\"", "command = \"true\""), &["expected a text that the command writes"]),
+        ("[[hosts]]\nname = \"alone\"\ncommand = \"true\"\n".to_owned(), &["one host alone has no link", "world = \"world\""]),
+        ("[exec]\nworld = \"a\"\n[[hosts]]\nname = \"a\"\ncommand = \"true\"\n".to_owned(), &["there is a host \"a\" already"]),
+        (net("command = \"true\"", "comand = \"true\""), &["comand", "did you mean \"command\"?"]),
+    ] {
+        desk.write("net.toml", &text);
+        desk.cohaptic_within(PATIENCE, "exec net.toml").assert_refused(125, parts);
+    }
+    assert_eq!(desk.cohaptic_within(PATIENCE, "exec net.toml --set link.delay=1ms -- true").status, Some(125));
+}

@@ -1,0 +1,260 @@
+//! The network between hosts, without devices and without a clock. Packets of IP come in from a host at an instant, and leave to another host at the instant
+//! that the link between both gives.
+
+use core::net::IpAddr;
+use core::time::Duration;
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+
+use cohaptic_router::{Content, Packet};
+use cohaptic_units::{Bytes, Instant};
+use cohaptic_wan::{Fate, LinkModel, LinkStats, Network, NetworkConfig, NodeId, PacketEvent, PacketRecord, Path};
+
+/// Hosts of a network, and the links between them.
+#[derive(Debug)]
+pub struct Exchange {
+    network: Network<Arc<Packet>>,
+    /// Names of the hosts, indexed by node.
+    names: Vec<String>,
+    /// Host of each address.
+    routes: BTreeMap<IpAddr, NodeId>,
+    /// Host that gets the packets to all other addresses, or `None` if these packets are dropped.
+    gateway: Option<NodeId>,
+    /// Latest instant given by the driver.
+    now: Instant,
+    /// Latest instant up to which the cross packets of all links are computed.
+    caught_up: Instant,
+    /// Links that have cross-traffic.
+    with_cross: Vec<Path>,
+    /// Packets inside the links, indexed by sender. Signed, because the end of a copy can be reported before its making.
+    held: Vec<i64>,
+    /// Bytes of IP inside the links.
+    held_bytes: i64,
+    departures: VecDeque<Departure>,
+    counts: Counts,
+}
+
+/// Host of an [`Exchange`].
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Node {
+    /// Name, unique in the network. Names of links and random streams are made of it.
+    pub name: String,
+    /// Addresses of the host.
+    pub addresses: Vec<IpAddr>,
+}
+
+/// Packet that leaves a link.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Departure {
+    /// Logical departure.
+    pub at: Instant,
+    /// Record of the way: sender and receiver, the number of the packet on its link, and marks.
+    pub record: PacketRecord<Path>,
+    /// Packet, with the marks and bit errors of its link.
+    pub packet: Arc<Packet>,
+}
+
+/// Packets that no link has taken, by reason.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Counts {
+    /// Packets that contradict themselves.
+    pub malformed: u64,
+    /// Packets to an address that no host has, such as the multicast addresses to which hosts speak by themselves.
+    pub no_host: u64,
+    /// Packets dropped because too much was inside the links.
+    pub overload: u64,
+}
+
+/// Packets and bytes inside all links at most, as for `cohaptic router`: more than any real line holds, and little enough for the memory.
+const MOST_PACKETS: i64 = 262_144;
+const MOST_BYTES: i64 = 256 << 20;
+
+/// Time after which cross packets are computed without a packet that meets them, as in [`cohaptic_router::Engine`].
+const CATCH_UP: Duration = Duration::from_millis(10);
+
+impl Exchange {
+    /// Returns a network without packets. `link` gives the model of the link from one node to another, by their indices in `nodes`. Packets to addresses of no
+    /// node go to the node `gateway`.
+    #[must_use]
+    pub fn new(seed: u64, nodes: &[Node], gateway: Option<usize>, mut link: impl FnMut(usize, usize) -> LinkModel) -> Self {
+        let names: Vec<String> = nodes.iter().map(|node| node.name.clone()).collect();
+        let mut with_cross = Vec::new();
+        let config = NetworkConfig { seed, nodes: names.clone(), general: false };
+        let network = Network::new(config, |from, to| {
+            let model = link(usize::from(from.0), usize::from(to.0));
+            with_cross.extend((from != to && model.has_cross_traffic()).then_some(Path { from, to }));
+            model
+        });
+        let addresses = nodes.iter().enumerate().flat_map(|(index, node)| node.addresses.iter().map(move |address| (*address, NodeId::new(index))));
+        Self {
+            network: network.with_flows(|_, packet: &Arc<Packet>| packet.flow()),
+            names,
+            routes: addresses.collect(),
+            gateway: gateway.map(NodeId::new),
+            now: Instant::ZERO,
+            caught_up: Instant::ZERO,
+            with_cross,
+            held: vec![0; nodes.len()],
+            held_bytes: 0,
+            departures: VecDeque::new(),
+            counts: Counts::default(),
+        }
+    }
+
+    /// Passes a packet from a host. An instant before the latest instant counts as the latest instant.
+    pub fn handle_packet(&mut self, now: Instant, from: NodeId, packet: Packet) {
+        self.handle_timeout(now);
+        let Content::Ip { headers, .. } = packet.content() else {
+            self.counts.malformed += 1;
+            return;
+        };
+        let Some(to) = self.receiver(headers.destination).filter(|to| *to != from) else {
+            self.counts.no_host += 1;
+            return;
+        };
+        let (info, bytes) = (packet.info(), i64::try_from(headers.length).unwrap_or(i64::MAX));
+        if self.held.iter().sum::<i64>() >= MOST_PACKETS || self.held_bytes + bytes > MOST_BYTES {
+            self.counts.overload += 1;
+            return;
+        }
+        self.held[usize::from(from.0)] += 1;
+        self.held_bytes += bytes;
+        let offered = self.network.handle_packet(self.now, from, to, info, Arc::new(packet));
+        debug_assert_eq!(offered, Ok(()), "time has not gone back, and every pair of hosts has a link");
+        self.drain();
+    }
+
+    /// Returns the host that gets the packets to an address.
+    fn receiver(&self, address: IpAddr) -> Option<NodeId> {
+        // A gateway leads to single hosts: nobody beyond it hears what is said to all.
+        let is_to_all = address.is_multicast() || address.is_unspecified() || address == IpAddr::V4(core::net::Ipv4Addr::BROADCAST);
+        self.routes.get(&address).copied().or_else(|| self.gateway.filter(|_| !is_to_all))
+    }
+
+    /// Lets logical time pass until `now`.
+    pub fn handle_timeout(&mut self, now: Instant) {
+        self.now = self.now.max(now);
+        let passed = self.network.handle_timeout(self.now);
+        debug_assert_eq!(passed, Ok(()), "time has not gone back");
+        self.drain();
+        if !self.with_cross.is_empty() && self.now.saturating_duration_since(self.caught_up) >= CATCH_UP {
+            self.caught_up = self.now;
+            for Path { from, to } in &self.with_cross {
+                let caught_up = self.network.catch_up(self.now, *from, *to);
+                debug_assert_eq!(caught_up, Ok(()), "the links exist, and time has not gone back");
+            }
+        }
+    }
+
+    /// Returns the instant of the next necessary call of [`Exchange::handle_timeout`], or `None` if no packet is inside a link.
+    #[must_use]
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        self.network.poll_timeout()
+    }
+
+    /// Returns the next packet that leaves, in the order of instants, or `None` when all have been polled.
+    #[must_use]
+    pub fn poll_departure(&mut self) -> Option<Departure> {
+        self.departures.pop_front()
+    }
+
+    /// Collects the events of the links: deliveries become departures, and every end frees room.
+    fn drain(&mut self) {
+        while let Some(event) = self.network.poll_event() {
+            let (from, bytes) = (usize::from(event.path.from.0), i64::try_from(event.size.get()).unwrap_or(i64::MAX));
+            let sign = if event.fate.is_end() { -1 } else { 1 };
+            self.held[from] += sign;
+            self.held_bytes += sign * bytes;
+            let Fate::Delivered(at) = event.fate else { continue };
+            let PacketEvent { record, payload: mut packet, damage, part: _ } = event;
+            if record.marked || damage.is_some() {
+                // A copy may share the packet. `make_mut` then clones the packet, so that the copy keeps its own marks and bits.
+                let packet = Arc::make_mut(&mut packet);
+                if record.marked {
+                    packet.mark_congestion();
+                }
+                if let Some(damage) = &damage {
+                    packet.damage(damage);
+                }
+            }
+            self.departures.push_back(Departure { at, record, packet });
+        }
+    }
+
+    /// Returns the number of packets of a host that are inside its links.
+    #[must_use]
+    pub fn in_flight(&self, from: NodeId) -> u64 {
+        self.held.get(usize::from(from.0)).map_or(0, |held| u64::try_from(*held).unwrap_or(0))
+    }
+
+    /// Returns the names of the hosts, indexed by node.
+    #[must_use]
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Returns the counters of the link from one host to another, or `None` if the hosts are one or do not exist.
+    #[must_use]
+    pub fn link_stats(&self, from: NodeId, to: NodeId) -> Option<LinkStats> {
+        self.network.link_stats(from, to)
+    }
+
+    /// Returns the numbers of packets that no link has taken.
+    #[must_use]
+    pub const fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// Returns the bytes of IP that are inside the links.
+    #[must_use]
+    pub fn held_bytes(&self) -> Bytes {
+        Bytes::new(u64::try_from(self.held_bytes).unwrap_or(0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cohaptic_linkfile::link_from_keys;
+    use etherparse::PacketBuilder;
+
+    use super::*;
+
+    fn exchange(keys: &str) -> Exchange {
+        let model = link_from_keys(&keys.split(' ').map(str::to_owned).collect::<Vec<_>>()).unwrap();
+        let node = |name: &str, address: [u8; 4]| Node { name: name.to_owned(), addresses: vec![address.into()] };
+        let nodes = [node("a", [10, 0, 0, 1]), node("b", [10, 0, 0, 2]), node("world", [10, 0, 0, 3])];
+        Exchange::new(1, &nodes, Some(2), |_, _| model.clone())
+    }
+
+    fn datagram(to: [u8; 4]) -> Packet {
+        let mut bytes = Vec::new();
+        PacketBuilder::ipv4([10, 0, 0, 1], to, 64).udp(1, 2).write(&mut bytes, b"data").unwrap();
+        Packet::checked(bytes)
+    }
+
+    /// Packets go to the host of their address, all others to the gateway, and those to everybody to nobody.
+    #[test]
+    fn the_address_chooses_the_host() {
+        let mut exchange = exchange("delay=10ms");
+        for to in [[10, 0, 0, 2], [192, 0, 2, 7], [224, 0, 0, 1], [255, 255, 255, 255], [10, 0, 0, 1]] {
+            exchange.handle_packet(Instant::ZERO, NodeId(0), datagram(to));
+        }
+        assert_eq!((exchange.in_flight(NodeId(0)), exchange.counts().no_host), (2, 3));
+        let due = exchange.poll_timeout().unwrap();
+        exchange.handle_timeout(due);
+        let departures: Vec<_> =
+            std::iter::from_fn(|| exchange.poll_departure()).map(|departure| (departure.at.as_nanos(), departure.record.path.to.0)).collect();
+        assert_eq!(departures, [(10_000_000, 1), (10_000_000, 2)]);
+        assert_eq!((exchange.in_flight(NodeId(0)), exchange.held_bytes()), (0, Bytes::new(0)));
+    }
+
+    #[test]
+    fn a_lost_packet_and_a_copy_leave_nothing_behind() {
+        for keys in ["loss=100%", "delay=1ms duplicate=100%"] {
+            let mut exchange = exchange(keys);
+            exchange.handle_packet(Instant::ZERO, NodeId(0), datagram([10, 0, 0, 2]));
+            exchange.handle_timeout(Instant::from_nanos(2_000_000));
+            assert_eq!((exchange.in_flight(NodeId(0)), exchange.held_bytes()), (0, Bytes::new(0)), "{keys}");
+        }
+    }
+}

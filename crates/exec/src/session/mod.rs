@@ -1,0 +1,216 @@
+//! A whole run: hosts with their commands, the links between them, and the gateway.
+
+mod output;
+mod watch;
+
+use core::time::Duration;
+use std::ffi::OsString;
+use std::io::BufWriter;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::thread;
+
+use cohaptic_capture::CaptureWriter;
+use cohaptic_linkfile::LinkTable;
+use cohaptic_realtime::{LatenessSummary, Pacing, Prepared, Tolerance, Validity, Wishes, prepare_thread};
+use cohaptic_units::Instant;
+use cohaptic_wan::{LinkStats, NodeId};
+use nix::sys::signalfd::SignalFd;
+
+use crate::emulation::{Capture, Emulation, Port};
+use crate::exchange::{Counts, Exchange, Node};
+use crate::gateway::Gateway;
+use crate::host::{Failed, Host};
+use crate::inside::Setup;
+use crate::signals;
+use output::Outputs;
+pub use output::{Line, Stream};
+use watch::Watch;
+
+/// Hosts, links and gateway of a run.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Hosts, in the order of their start.
+    pub hosts: Vec<HostPlan>,
+    /// Way to the real world, or `None` for none.
+    pub gateway: Option<GatewayPlan>,
+    /// Links between the nodes: the hosts, and the gateway after them if there is one.
+    pub links: LinkTable,
+    /// Way in which the thread of the network waits.
+    pub pacing: Pacing,
+    /// Requests of the thread of the network to the system.
+    pub wishes: Wishes,
+    /// Lateness of a packet from which on it is late.
+    pub tolerance: Tolerance,
+    /// Folder for a capture of each host, or `None` for no captures.
+    pub captures: Option<PathBuf>,
+}
+
+/// Host of a [`Plan`].
+#[derive(Clone, Debug)]
+pub struct HostPlan {
+    /// Name of the host: of its links, its capture and its output.
+    pub name: String,
+    /// Network and names that the command sees.
+    pub setup: Setup,
+    /// Command with its arguments.
+    pub command: Vec<OsString>,
+    /// `true` if the run ends with this command and has its status.
+    pub is_main: bool,
+    /// Text in the output from which on the next hosts may start, or `None` if they may start at once.
+    pub ready: Option<String>,
+    /// `true` if the output goes line by line to the listener of [`run`], `false` if the command writes where this program writes, and reads what it reads.
+    pub is_piped: bool,
+}
+
+/// Way to the real world.
+#[derive(Clone, Debug)]
+pub struct GatewayPlan {
+    /// Name of the gateway: of its links.
+    pub name: String,
+    /// Name server of the machine.
+    pub name_server: Option<SocketAddr>,
+    /// Addresses of the machine that lead to the same port of the first host.
+    pub listen: Vec<SocketAddr>,
+}
+
+/// Result of a run.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Exit status: that of the main command, or else of the first command that ended with another status than 0, or else 0.
+    pub status: u8,
+    /// Exit status of each command, or `None` for a command that did not end by itself in time.
+    pub statuses: Vec<Option<u8>>,
+    /// What passed the links.
+    pub report: Report,
+}
+
+/// Counters of the network at the end of a run.
+#[derive(Debug)]
+pub struct Report {
+    /// Length of the run.
+    pub elapsed: Duration,
+    /// Counters of each link, with the indices of sender and receiver among [`Report::nodes`].
+    pub links: Vec<(usize, usize, LinkStats)>,
+    /// Names of the hosts, and of the gateway.
+    pub nodes: Vec<String>,
+    /// Packets that no link has taken.
+    pub untaken: Counts,
+    /// Packets that the device of each node, or the gateway, did not take, indexed by node.
+    pub refused: Vec<u64>,
+    /// Lateness of the packets.
+    pub release: LatenessSummary,
+    /// Whether the packets were on time.
+    pub validity: Validity,
+    /// Answers of the system to the requests of the thread.
+    pub prepared: Prepared,
+    /// First error of a capture.
+    pub capture_error: Option<String>,
+}
+
+/// Runs a plan. `hear` gets each line that a piped command writes.
+///
+/// # Errors
+///
+/// [`Failed`] with an exit status, if the hosts cannot be made or a command cannot be started. Everything begun has ended then.
+pub fn run(plan: &Plan, hear: &(dyn Fn(Line<'_>) + Sync)) -> Result<Outcome, Failed> {
+    // Before the first thread, so that all threads inherit the mask and the signals wait for `Watch`.
+    let signals = signals::passed_on();
+    let signals =
+        signals.thread_block().and_then(|()| SignalFd::new(&signals)).map_err(|error| Failed::own(format!("cannot watch signals: {error}")))?;
+    let mut hosts = Vec::new();
+    for host in &plan.hosts {
+        hosts.push(Host::begin(&host.setup, &host.command, host.is_piped).map_err(|failed| named(plan, host, failed))?);
+    }
+    let mut ports = Vec::new();
+    for (host, of) in hosts.iter().zip(&plan.hosts) {
+        ports.push(Port::Device(host.device().map_err(|failed| named(plan, of, failed))?));
+    }
+    let mut nodes: Vec<Node> = plan.hosts.iter().map(node).collect();
+    if let Some(gateway) = &plan.gateway {
+        ports.push(Port::Gateway(Box::new(open(gateway)?)));
+        nodes.push(Node { name: gateway.name.clone(), addresses: Vec::new() });
+    }
+    let gateway = plan.gateway.as_ref().map(|_| plan.hosts.len());
+    let exchange = Exchange::new(plan.seed, &nodes, gateway, |from, to| plan.links.between(from, to).clone());
+    let captures = nodes.iter().enumerate().map(|(place, node)| capture(plan, place, node)).collect::<Result<_, _>>()?;
+    let (mut emulation, stop) =
+        Emulation::new(exchange, ports, captures).map_err(|error| Failed::own(format!("cannot make the network: {error}")))?;
+    let outputs = Outputs::new(&mut hosts, plan).map_err(|error| Failed::own(format!("cannot read the output of the commands: {error}")))?;
+    let (driven, ended) = thread::scope(|scope| {
+        let driver = thread::Builder::new().name("network".to_owned()).spawn_scoped(scope, || {
+            let prepared = prepare_thread(&plan.wishes);
+            let ran = emulation.run(plan.pacing);
+            // Without the network the commands would wait for ever.
+            outputs.network_has_ended();
+            (prepared, ran)
+        });
+        let driver = driver.map_err(|error| Failed::own(format!("the system gives the network no thread: {error}")))?;
+        let readers = outputs.read(scope, hear);
+        let ended = readers.and_then(|()| Watch::new(plan, &hosts, &signals, &outputs).until_all_have_ended(&stop));
+        // A failure leaves nothing that has to arrive.
+        if ended.is_err() {
+            stop.now();
+        }
+        // Commands that did not end in time end here, and with them the pipes of their output. The devices stay, so that the network still passes on what the
+        // commands have sent.
+        hosts.clear();
+        let driven = driver.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        Ok((driven, ended?))
+    })?;
+    let (prepared, ran) = driven;
+    ran.map_err(|error| Failed::own(format!("the network has failed: {error}")))?;
+    let (status, statuses) = ended;
+    Ok(Outcome { status, statuses, report: report(plan, &mut emulation, prepared) })
+}
+
+/// Returns a failure with the name of its host, if there are several.
+fn named(plan: &Plan, host: &HostPlan, failed: Failed) -> Failed {
+    if plan.hosts.len() < 2 { failed } else { Failed { why: format!("host {}: {}", host.name, failed.why), ..failed } }
+}
+
+fn node(host: &HostPlan) -> Node {
+    Node { name: host.name.clone(), addresses: host.setup.addresses.iter().map(|network| network.address()).collect() }
+}
+
+fn open(plan: &GatewayPlan) -> Result<Gateway, Failed> {
+    let mut gateway = Gateway::new(plan.name_server).map_err(|error| Failed::own(format!("cannot make the gateway: {error}")))?;
+    for address in &plan.listen {
+        gateway.listen(*address).map_err(|error| Failed::own(format!("cannot listen at {address}: {error}")))?;
+    }
+    Ok(gateway)
+}
+
+/// Begins the capture of a host. The gateway has none: the captures of the hosts have its packets.
+fn capture(plan: &Plan, place: usize, node: &Node) -> Result<Option<Capture>, Failed> {
+    let Some(folder) = plan.captures.as_deref().filter(|_| place < plan.hosts.len()) else { return Ok(None) };
+    let path = capture_path(folder, &node.name);
+    let begun = std::fs::File::create(&path).and_then(|file| CaptureWriter::new(BufWriter::new(file), &node.name));
+    begun.map(Some).map_err(|error| Failed::own(format!("cannot write {}: {error}", path.display())))
+}
+
+/// Returns the path of the capture of a host.
+#[must_use]
+pub fn capture_path(folder: &Path, host: &str) -> PathBuf {
+    folder.join(format!("{host}.pcapng"))
+}
+
+fn report(plan: &Plan, emulation: &mut Emulation, prepared: Prepared) -> Report {
+    let capture_error = emulation.finish_captures().map(|error| error.to_string());
+    let exchange = emulation.exchange();
+    let nodes = exchange.names().to_vec();
+    let pairs = (0..nodes.len()).flat_map(|from| (0..nodes.len()).map(move |to| (from, to)));
+    Report {
+        elapsed: emulation.elapsed().saturating_duration_since(Instant::ZERO),
+        links: pairs.filter_map(|(from, to)| Some((from, to, exchange.link_stats(NodeId::new(from), NodeId::new(to))?))).collect(),
+        nodes,
+        untaken: exchange.counts(),
+        refused: emulation.refused().collect(),
+        release: emulation.release().summary(),
+        validity: plan.tolerance.judge(emulation.release(), "packets"),
+        prepared,
+        capture_error,
+    }
+}

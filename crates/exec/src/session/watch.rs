@@ -1,0 +1,161 @@
+//! Watch over the commands of a run: their starts, signals and ends.
+
+use core::time::Duration;
+use std::io;
+use std::os::fd::{AsFd as _, BorrowedFd};
+
+use cohaptic_realtime::{Clock as _, MonotonicClock};
+use cohaptic_units::Instant;
+use nix::sys::signal::Signal;
+use nix::sys::signalfd::SignalFd;
+
+use super::output::Outputs;
+use super::{Plan, named};
+use crate::channel::{Order, Report as Told};
+use crate::emulation::Stop;
+use crate::host::{Failed, Host};
+use crate::signals;
+
+/// Time that commands have after SIGTERM until they are killed.
+const TO_END: Duration = Duration::from_secs(5);
+
+/// State of a command.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum State {
+    /// The command waits for the hosts before it to be ready.
+    Waits,
+    Runs,
+    Ended(u8),
+}
+
+/// Watches over the commands: starts them in turn, passes signals on, and ends them together.
+pub(super) struct Watch<'a> {
+    plan: &'a Plan,
+    /// Hosts; `None` after the host was ended by force.
+    hosts: Vec<Option<&'a Host>>,
+    states: Vec<State>,
+    signals: &'a SignalFd,
+    outputs: &'a Outputs,
+    clock: MonotonicClock,
+    /// Status of the run, once it is known.
+    status: Option<u8>,
+    /// End of the patience with the other commands, once the run is ending.
+    kill_at: Option<Instant>,
+}
+
+impl<'a> Watch<'a> {
+    pub(super) fn new(plan: &'a Plan, hosts: &'a [Host], signals: &'a SignalFd, outputs: &'a Outputs) -> Self {
+        let states = vec![State::Waits; hosts.len()];
+        let hosts = hosts.iter().map(Some).collect();
+        Self { plan, hosts, states, signals, outputs, clock: MonotonicClock::start(), status: None, kill_at: None }
+    }
+
+    /// Runs the commands until all have ended, or until those that do not end are given up. Returns the status of the run, and those of the commands.
+    pub(super) fn until_all_have_ended(mut self, stop: &Stop) -> Result<(u8, Vec<Option<u8>>), Failed> {
+        while self.hosts.iter().any(Option::is_some) {
+            self.start_ready()?;
+            if self.kill_at.is_some_and(|at| self.clock.now() >= at) {
+                break;
+            }
+            self.wait().map_err(|error| Failed::own(format!("cannot wait for the commands: {error}")))?;
+            if self.outputs.has_network_ended() {
+                // The thread of the network says why.
+                break;
+            }
+            self.pass_signals().map_err(|error| Failed::own(format!("cannot pass signals on: {error}")))?;
+            self.hear()?;
+        }
+        stop.finish();
+        let ended = |state: &State| if let State::Ended(status) = state { Some(*status) } else { None };
+        Ok((self.status.unwrap_or(0), self.states.iter().map(ended).collect()))
+    }
+
+    /// Starts the commands of all hosts before which every host is ready.
+    fn start_ready(&mut self) -> Result<(), Failed> {
+        for place in 0..self.states.len() {
+            if self.states[place] == State::Waits && self.kill_at.is_none() {
+                let Some(host) = self.hosts[place] else { continue };
+                let started = host.start(!self.plan.hosts[place].is_piped);
+                started.map_err(|error| Failed::own(format!("cannot start the command: {error}")))?;
+                self.states[place] = State::Runs;
+            }
+            // A command that has ended keeps nobody waiting: the run goes on, or ends with its status.
+            let is_waited_for = self.plan.hosts[place].ready.is_some() && !self.outputs.is_ready(place) && self.states[place] == State::Runs;
+            if is_waited_for {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits for a signal, a report, a host that has become ready, or the end of patience.
+    fn wait(&self) -> io::Result<()> {
+        let mut readable: Vec<BorrowedFd<'_>> = self.hosts.iter().flatten().map(|host| host.channel.as_fd()).collect();
+        readable.extend([self.signals.as_fd(), self.outputs.as_fd()]);
+        self.clock.block(self.kill_at, &readable)?;
+        if is_readable(self.outputs.as_fd())? { self.outputs.take_wake() } else { Ok(()) }
+    }
+
+    fn pass_signals(&self) -> io::Result<()> {
+        if !is_readable(self.signals.as_fd())? {
+            return Ok(());
+        }
+        let Some(got) = signals::read(self.signals)? else { return Ok(()) };
+        if got.is_of_terminal {
+            return Ok(());
+        }
+        // Process 1 then has the signal too, if it was sent to the whole group.
+        self.clock.block(Some(self.clock.now().saturating_add(signals::GROUP)), &[])?;
+        self.tell_all(got.signal);
+        Ok(())
+    }
+
+    /// Passes a signal to all commands that run.
+    fn tell_all(&self, signal: Signal) {
+        let number = u8::try_from(signal as i32).unwrap_or(0);
+        for host in self.hosts.iter().flatten() {
+            // A host that has just ended needs no signal.
+            let _ = host.channel.order(Order::Signal(number), None);
+        }
+    }
+
+    /// Reads the reports of the hosts.
+    fn hear(&mut self) -> Result<(), Failed> {
+        for place in 0..self.hosts.len() {
+            let plan = &self.plan.hosts[place];
+            let unheard = |error: io::Error| Failed::own(format!("cannot hear the process inside: {error}"));
+            while let Some(host) = self.hosts[place]
+                && is_readable(host.channel.as_fd()).map_err(unheard)?
+            {
+                match host.channel.next_report().map_err(unheard)? {
+                    Some((Told::Started | Told::Device(_), _)) => {}
+                    Some((Told::Ended(status), _)) => self.end(place, status),
+                    Some((Told::Failed(status, why), _)) => return Err(named(self.plan, plan, Failed { status, why })),
+                    None if self.states[place] == State::Waits || self.kill_at.is_some() => self.hosts[place] = None,
+                    None => return Err(named(self.plan, plan, Failed::own("the process inside has ended without a word".to_owned()))),
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes the end of a command. The end of the main command, or without one the first failure, ends the run: the other commands get SIGTERM.
+    fn end(&mut self, place: usize, status: u8) {
+        self.states[place] = State::Ended(status);
+        self.hosts[place] = None;
+        let has_main = self.plan.hosts.iter().any(|host| host.is_main);
+        let decides = if has_main { self.plan.hosts[place].is_main } else { status != 0 };
+        if decides && self.status.is_none() {
+            self.status = Some(status);
+            self.kill_at = Some(self.clock.now().saturating_add(TO_END));
+            self.tell_all(Signal::SIGTERM);
+        }
+    }
+}
+
+/// Returns whether a descriptor can be read now.
+fn is_readable(descriptor: BorrowedFd<'_>) -> io::Result<bool> {
+    use rustix::event::{PollFd, PollFlags, Timespec, poll};
+    let mut waited = [PollFd::from_borrowed_fd(descriptor, PollFlags::IN)];
+    Ok(poll(&mut waited, Some(&Timespec { tv_sec: 0, tv_nsec: 0 }))? > 0)
+}

@@ -1,0 +1,37 @@
+//! Signals that reach the command once.
+//!
+//! All processes of an `exec` are in one process group. A signal of the terminal (Ctrl-C) reaches the whole group, the command included. A signal that another
+//! process sends to the program alone must be passed on to the command, and a signal that another process sends to the whole group must not. The system does not
+//! tell both apart, but process 1 can: it is in the group too. The program waits a moment before it passes a signal on, and process 1 drops what it has got
+//! itself meanwhile.
+
+use core::time::Duration;
+use std::io;
+
+use nix::sys::signal::{SigSet, Signal};
+use nix::sys::signalfd::SignalFd;
+
+/// Time in which a signal to a group reaches all of its processes: the system sends them one after the other, within microseconds.
+pub(crate) const GROUP: Duration = Duration::from_millis(5);
+
+/// Signal that was read.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Got {
+    pub(crate) signal: Signal,
+    /// The terminal has sent the signal, to the whole process group.
+    pub(crate) is_of_terminal: bool,
+}
+
+/// Returns the signals that are passed on to the command.
+pub(crate) fn passed_on() -> SigSet {
+    [Signal::SIGHUP, Signal::SIGINT, Signal::SIGQUIT, Signal::SIGTERM, Signal::SIGUSR1, Signal::SIGUSR2].into_iter().collect()
+}
+
+/// Reads the next signal.
+pub(crate) fn read(signals: &SignalFd) -> io::Result<Option<Got>> {
+    /// `SI_KERNEL`: the kernel has sent the signal, which for these signals means a terminal.
+    const OF_KERNEL: i32 = 0x80;
+    let Some(info) = signals.read_signal()? else { return Ok(None) };
+    let number = i32::try_from(info.ssi_signo).map_err(io::Error::other)?;
+    Ok(Some(Got { signal: Signal::try_from(number)?, is_of_terminal: info.ssi_code == OF_KERNEL }))
+}
