@@ -91,6 +91,7 @@ pages! {
     emulator: "docs/emulator.md",
     emulator_stages: "docs/emulator-stages.md",
     extending: "docs/extending.md",
+    exec: "docs/exec.md",
     falcon: "docs/falcon.md",
     hard_cases: "docs/hard-cases.md",
     live: "docs/live.md",

@@ -22,12 +22,12 @@ Behind a key stand its form, and its default or whether it must be given. A key 
 given there or in the table that holds for all, such as `[peer]`. Any other key without a default may be left out.
 ";
 const OF_NETWORKS: &str = "\
-Every key of [relay files](relay.md) and [router files](router.md). Links have a [page of their own](reference-link-keys.md). The notation is that of
+Every key of [relay files](relay.md), [router files](router.md) and [files of exec](exec.md#several-programs-each-on-a-host-of-its-own). Links have a [page of their own](reference-link-keys.md). The notation is that of
 [reference-keys.md](reference-keys.md).
 ";
 const OF_LINKS: &str = "\
 Every key of a link. [emulator-stages.md](emulator-stages.md) says exactly what each does to a packet. They are taken by `[link]`, `[[links]]`, `uplink` and `downlink` of
-[scenes](scenes.md), by [relay files](relay.md), by `[links.NAME]` of [router files](router.md), by `set` in a timeline, by `cohaptic link`, and by
+[scenes](scenes.md), by [relay files](relay.md) and [files of exec](exec.md), by `[links.NAME]` of [router files](router.md), by `set` in a timeline, by `cohaptic link`, and by
 [live control](live-control.md). The notation is that of [reference-keys.md](reference-keys.md).
 
 A link is often laid over another one: `[[links]]` over `[link]`, a change over what holds by then. Each key replaces the earlier one as a whole. Its default takes the earlier one
@@ -77,8 +77,10 @@ pub(super) fn pages() -> [(&'static str, String); 3] {
     (reference.page, reference.puts_off) = (SCENES, false);
     let scenes = head("Reference: keys of scenes", OF_SCENES) + &reference.file(FileSchema::Scene, "##", "Scene");
     reference.page = NETWORKS;
-    let mut networks = head("Reference: keys of relays and routers", OF_NETWORKS);
-    for (kind, heading, name) in [(FileSchema::Relay, "Relay files", "Relay"), (FileSchema::Router, "Router files", "Router")] {
+    let mut networks = head("Reference: keys of relays, routers and exec", OF_NETWORKS);
+    for (kind, heading, name) in
+        [(FileSchema::Relay, "Relay files", "Relay"), (FileSchema::Router, "Router files", "Router"), (FileSchema::Exec, "Exec files", "Exec")]
+    {
         networks += &format!("## {heading}\n\n{}", reference.file(kind, "###", name));
     }
     [(LINKS, links), (SCENES, scenes), (NETWORKS, networks)].map(|(page, text)| (page, text.trim_end().to_owned() + "\n"))
