@@ -820,7 +820,7 @@ static inline cohaptic_cause cohaptic_gate_admit(cohaptic_gate *gate, const doub
 typedef enum {
     COHAPTIC_READ_NOTHING,   /* no reading: `state` was not written, and the reading before grows old */
     COHAPTIC_READ_NOT_READY, /* the device is not calibrated or not powered: `state` means nothing */
-    COHAPTIC_READ_NOT_ARMED, /* `state` is valid, and the person has not switched forces on */
+    COHAPTIC_READ_NOT_ARMED, /* `state` is valid, and the person has not switched forces on: the hand feels and moves nothing */
     COHAPTIC_READ            /* `state` is valid, and forces may come */
 } cohaptic_reading;
 
@@ -844,8 +844,8 @@ typedef struct {
     const char *key_file;     /* file of 64 hexadecimal digits that only its owner may read, or NULL for a session without a key */
     cohaptic_session session; /* number and place; without a key everything */
     cohaptic_scene scene;
-    uint64_t fingerprint;     /* of the scene, which the session compares; 0 if unknown */
-    const char *label;        /* ASCII, at most 8 bytes, which the session shows; NULL for none */
+    uint64_t fingerprint;     /* of the scene, which the session prints and compares; 0 if unknown */
+    const char *label;        /* of the device, for displays: at most 8 printable ASCII characters without a space; NULL for none */
     double patience;          /* how long a welcome may take [s] */
     double fade;              /* time in which the pull of the device comes and goes [s] */
     double force_limit;       /* [N] */
@@ -1044,9 +1044,16 @@ static inline const char *cohaptic_say_hello(cohaptic_client *client, const uint
         }
         cohaptic_wait_until(now + 1000000);
     }
-    snprintf(client->error, sizeof client->error, "no welcome for place %lu of session %llu within %g s: is the session up, and is the key the same?",
-             (unsigned long)session->place, (unsigned long long)session->number, options->patience);
+    snprintf(client->error, sizeof client->error, "no welcome for place %lu of session %llu within %g s: is the session up, and is the key the same?%s",
+             (unsigned long)session->place, (unsigned long long)session->number, options->patience,
+             options->fingerprint ? " Does the session print another fingerprint?" : "");
     return client->error;
+}
+
+static inline int cohaptic_is_label(const char *label) {
+    size_t len = 0;
+    while (label[len] > ' ' && label[len] < 0x7f) ++len;
+    return label[len] == 0 && len <= 8;
 }
 
 /* Joins a session. Returns NULL, or a sentence that says what is wrong; cohaptic_close() is harmless then. */
@@ -1062,7 +1069,7 @@ static inline const char *cohaptic_open(cohaptic_client *client, const cohaptic_
     /* Before the handshake, so that a stop during the handshake is not lost. */
     limits = cohaptic_usual_limits(options->scene.exchange_every, 0);
     cohaptic_gate_begin(&client->gate, &limits);
-    if (strlen(label) > 8) return "a label has at most 8 bytes";
+    if (!cohaptic_is_label(label)) return "a label has at most 8 printable ASCII characters, and no space";
     if (!(options->force_limit >= 0 && options->force_limit <= 20)) return "the limit of force must be within 0 to 20 N";
     if (options->key_file && (error = cohaptic_read_key(options->key_file, key)) != NULL) {
         snprintf(client->error, sizeof client->error, "%.128s: %s", options->key_file, error);
@@ -1184,9 +1191,9 @@ static inline const char *cohaptic_run(cohaptic_client *client, const cohaptic_d
             /* A reading that cannot be used leaves the one before in force, which grows old. */
             if (read != COHAPTIC_READ_NOTHING && moment.ready && finite) moment.reading_at = moment.now;
             else state = peer->read_before;
-            device_is_felt = moment.ready && cohaptic_is_fresh(moment.now, moment.reading_at, client->gate.limits.reading_age_ns);
+            device_is_felt = moment.ready && moment.armed && cohaptic_is_fresh(moment.now, moment.reading_at, client->gate.limits.reading_age_ns);
         }
-        /* A device that cannot be read fades out of the copy and comes back as slowly, so that the others feel no jump. */
+        /* A device that cannot be read, or may not be felt, fades out of the copy and comes back as slowly, so that the others feel no jump. */
         peer->weight = device_is_felt ? fmin(1, peer->weight + per_tick) : fmax(0, peer->weight - per_tick);
         cohaptic_peer_tick(peer, k, &state, NULL);
         client->ticks = k + 1;

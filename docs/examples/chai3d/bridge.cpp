@@ -106,8 +106,8 @@ static const char *const USAGE =
     "usage: bridge HOST:PORT --session N --place I [option value ...]\n"
     "  --key-file FILE      64 hexadecimal digits; then the session tells axes and peers\n"
     "  --peers 2  --axes 3\n"
-    "  --label TEXT         at most 8 ASCII bytes, such as chai3d, which the session shows\n"
-    "  --fingerprint HEX    of the scene, which the session compares\n"
+    "  --label chai3d       what the session shows: at most 8 printable ASCII characters\n"
+    "  --fingerprint HEX    of the scene, which the session prints and compares\n"
     "  --duration S         [until Ctrl-C]\n"
     "  --patience 10        how long to wait for a welcome, s\n"
     "  --force-limit 3      N; never more than the device gives\n"
@@ -127,7 +127,7 @@ static cohaptic_gains gainsOf(const std::string &text) {
 // Reads the command line. `door`, `key_file` and `label` of the result point into it.
 static cohaptic_options parse(int argc, char **argv, double &duration) {
     cohaptic_options options = cohaptic_usual();
-    options.session.axes = 3;
+    options.session.axes = 3, options.label = "chai3d";
     bool session = false, place = false;
     if (argc < 2) throw std::invalid_argument("HOST:PORT is missing");
     options.door = argv[1];

@@ -33,7 +33,7 @@ class cCohapticDevice : public chai3d::cGenericHapticDevice {
     explicit cCohapticDevice(const cohaptic_options &options) : m_options(options), m_door(options.door), m_keyFile(options.key_file ? options.key_file : "") {
         // No device of its own holds the copy: the forces of the program are all that acts on it beside the coordination.
         m_options.scene.coupling.stiffness = m_options.scene.coupling.damping = 0;
-        if (options.label) m_label = options.label;
+        m_label = options.label ? options.label : "chai3d";
         m_options.label = m_label.c_str();
         m_deviceAvailable = true;
         m_specifications.m_model = chai3d::C_HAPTIC_DEVICE_CUSTOM;

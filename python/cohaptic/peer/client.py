@@ -64,9 +64,10 @@ class Client:
                     time.sleep(0.01)
                 elif told := joining.handle_welcome(datagram):
                     return told
+        about_scene = " Does the session print another fingerprint?" if joining.fingerprint else ""
         raise TimeoutError(
             f"no welcome for place {session.place} of session {session.number} within {patience} s: "
-            "is the session up, and is the key the same?"
+            f"is the session up, and is the key the same?{about_scene}"
         )
 
     def send(self, datagram: bytes) -> None:

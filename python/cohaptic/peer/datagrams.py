@@ -101,20 +101,22 @@ class Joining:
     """One joining in a session with a key: first the hello, then the keys of both directions."""
 
     def __init__(self, key: bytes, session: Session, fingerprint: int = 0, label: str = "") -> None:
-        self.key, self.session, self.fingerprint, self.label = key, session, fingerprint, label.encode("ascii")
-        if len(self.label) > 8:
-            raise ValueError("a label has at most 8 bytes")
+        if len(label) > 8 or not all("!" <= letter <= "~" for letter in label):
+            raise ValueError("a label has at most 8 printable ASCII characters, and no space")
+        self.key, self.session, self.fingerprint, self.label = key, session, fingerprint, label
         self.nonce = os.urandom(NONCE_LEN)
         self.to_door = self.to_peer = b""
 
     def again(self) -> Joining:
         """Returns another joining, with a nonce of its own."""
-        return Joining(self.key, self.session, self.fingerprint, self.label.decode("ascii"))
+        return Joining(self.key, self.session, self.fingerprint, self.label)
 
     def hello(self) -> bytes:
         """Returns the datagram that asks for the place."""
         session = self.session
-        hello = HELLO.pack(b"CHPH", 1, 0, session.number, session.place, 0, self.nonce, self.fingerprint, self.label)
+        hello = HELLO.pack(
+            b"CHPH", 1, 0, session.number, session.place, 0, self.nonce, self.fingerprint, self.label.encode()
+        )
         return hello + tag(self.key, hello)
 
     def handle_welcome(self, datagram: bytes) -> Session | None:

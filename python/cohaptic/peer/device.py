@@ -44,7 +44,7 @@ class Reading(NamedTuple):
     ready: bool = True
     """Whether the device is calibrated and powered. Otherwise position and velocity mean nothing."""
     armed: bool = True
-    """Whether the person has switched forces on."""
+    """Whether the person has switched forces on. Otherwise the hand feels and moves nothing."""
 
 
 class Device(Protocol):
@@ -127,8 +127,8 @@ def join(
 
     ``session`` is the seed of the scene and ``place`` the place of the peer among its peers, from 0. With ``key_file`` the session tells ``peers``,
     ``axes``, ``tick`` and ``update`` [s]; without one the caller does. ``coupling`` is KC and BC, ``coordination`` KT and BT [N/m, N·s/m]. These,
-    ``law``, the keys of the object, ``exchange_every`` and ``exchange_age`` must be those of the scene. ``fingerprint`` and ``label`` (at most 8 ASCII
-    bytes) are told to the session.
+    ``law``, the keys of the object, ``exchange_every`` and ``exchange_age`` must be those of the scene. With a key the session also hears ``fingerprint``,
+    which it compares with its own (0: unknown), and ``label``, at most 8 printable ASCII characters, which it shows.
 
     Each force passes a gate: at most ``force_limit`` [N], changed by at most 1000 N/s, and zero at once while the device is not ready, not armed or not
     read, while nobody is heard, and after a pause of the loop above 20 ms. A device that cannot be read lets go of the copy, and takes hold again, within
@@ -212,9 +212,9 @@ class _Loop:
         self.client.exchange(k)
         now = time.monotonic_ns()
         states = self._read(now) if peer.exchanges(k) else None
-        # A device that cannot be read fades out of the copy and comes back as slowly, so that the others feel no jump.
+        # A device that cannot be read, or may not be felt, fades out of the copy and comes back as slowly, so that the others feel no jump.
         is_read = self.reading_at is not None and now - self.reading_at <= self.gate.limits.reading_age_ns
-        peer.weight = grew(peer.weight, self.ready and is_read, self.per_tick)
+        peer.weight = grew(peer.weight, self.ready and self.armed and is_read, self.per_tick)
         peer.tick(k, states)
         self.k += 1
         # Nobody is felt in a session that is silent: no force is asked for then.

@@ -175,6 +175,9 @@ fn takes_part(language: Language, with_key: bool) {
     let false_ones = if with_key { 4 } else { 3 };
     assert!(summary.ignored <= false_ones * served.answers + stats.welcomed, "{summary:?}");
     assert!(served.door.seat(Instant::MAX, Place(2)).is_some_and(|seat| seat.address.is_none()));
+    // Of the programs the bridge alone names its device.
+    let label = served.door.seat(Instant::MAX, SEAT).unwrap().label;
+    assert_eq!(label.text(), matches!(language, Language::Chai3d).then_some("chai3d"));
 }
 
 /// The session is restarted while the program runs: the program hears nothing new for a second, says hello again, and joins again with new keys.
