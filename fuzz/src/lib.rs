@@ -9,6 +9,7 @@ pub mod captures;
 pub mod http;
 mod input;
 mod internet;
+pub mod inverse3;
 pub mod measurements;
 pub mod netem;
 pub mod offload;
@@ -28,10 +29,11 @@ pub use input::Input;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 13] = [
+pub const TARGETS: [Target; 14] = [
     ("admission", admission::run),
     ("captures", captures::run),
     ("http", http::run),
+    ("inverse3", inverse3::run),
     ("measurements", measurements::run),
     ("netem", netem::run),
     ("offload", offload::run),

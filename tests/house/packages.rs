@@ -157,9 +157,10 @@ fn every_package_says_what_a_registry_shows() {
 }
 
 /// Libraries that are of use without the rest of the project, each with the example that its README shows. The test of the example compares its output.
-const ALONE: [(&str, &str); 7] = [
+const ALONE: [(&str, &str); 8] = [
     ("device", "lever"),
     ("falcon", "wall"),
+    ("inverse3", "spring"),
     ("peer", "two_hands"),
     ("stability", "how_stiff"),
     ("tcp", "download"),

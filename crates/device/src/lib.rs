@@ -39,12 +39,14 @@ mod contract;
 mod force;
 mod gate;
 mod limits;
+mod mailbox;
 mod stopper;
 
 pub use contract::{Description, Device, Reading};
 pub use force::GatedForce;
 pub use gate::{Admitted, Changes, Gate, Moment, Verdict, ZeroCause};
 pub use limits::{Limits, LimitsError};
+pub use mailbox::Mailbox;
 pub use stopper::Stopper;
 
 #[cfg(test)]

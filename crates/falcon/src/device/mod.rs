@@ -4,7 +4,6 @@
 //! [`SteppedFalcon`] has no thread and is driven by the session's ticks, which a simulated Falcon in virtual time needs.
 
 mod axes;
-mod mailbox;
 mod stepped;
 mod threaded;
 mod turn;

@@ -5,11 +5,10 @@ use std::io;
 use std::sync::{Arc, OnceLock};
 use std::thread::{Builder, JoinHandle};
 
-use cohaptic_device::{Description, Device, GatedForce, Reading, Stopper};
+use cohaptic_device::{Description, Device, GatedForce, Mailbox, Reading, Stopper};
 use cohaptic_units::Instant;
 use thiserror::Error;
 
-use super::mailbox::Mailbox;
 use super::turn::{Turns, description, reading};
 use super::{DeviceConfig, DeviceConfigError, Snapshot};
 use crate::driver::DriverError;

@@ -6,23 +6,33 @@ use std::sync::RwLock;
 /// Attempts at a place that another thread uses.
 const TRIES: u32 = 64;
 
-/// The newest value of one writer. No thread waits: the writer writes to a place that no reader uses, and a reader returns without a value if the newest
-/// value is being replaced at each of its attempts.
+/// The newest value of one writer, such as the reading of a driver's thread for the thread of a session.
+///
+/// No thread waits: the writer writes to a place that no reader uses, and a reader returns without a value if the newest value is being replaced at each of its
+/// attempts.
 #[derive(Debug)]
-pub(super) struct Mailbox<T> {
+pub struct Mailbox<T> {
     /// Number of the newest value, counted from 1, above the two lowest bits, which contain the place of this value.
     newest: AtomicU64,
     /// Values with their numbers, counted from 1.
     places: [RwLock<Option<(T, u64)>>; 3],
 }
 
+impl<T: Copy> Default for Mailbox<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl<T: Copy> Mailbox<T> {
-    pub(super) const fn new() -> Self {
+    /// Returns a mailbox without a value.
+    #[must_use]
+    pub const fn new() -> Self {
         Self { newest: AtomicU64::new(0), places: [const { RwLock::new(None) }; 3] }
     }
 
     /// Makes `value` the newest value. Only one thread may write. A value is dropped if readers occupy both other places at all attempts.
-    pub(super) fn write(&self, value: T) {
+    pub fn write(&self, value: T) {
         // Relaxed is enough: only this thread writes `newest`.
         let newest = self.newest.load(Ordering::Relaxed);
         let number = (newest >> 2) + 1;
@@ -42,7 +52,8 @@ impl<T: Copy> Mailbox<T> {
 
     /// Returns the newest value and its number, if the number is greater than `seen`. With 0 for `seen`, every value is newer. Returns `None` also if the
     /// newest value is being replaced at all attempts.
-    pub(super) fn read_newer(&self, seen: u64) -> Option<(T, u64)> {
+    #[must_use]
+    pub fn read_newer(&self, seen: u64) -> Option<(T, u64)> {
         for _ in 0..TRIES {
             let newest = self.newest.load(Ordering::Acquire);
             // Acquire makes the value visible that was written before its place was published.

@@ -1,0 +1,3 @@
+//! Tests of client and simulated service together.
+
+mod faults;
