@@ -54,7 +54,7 @@ mod run;
 mod side;
 
 pub use engine::{Count, Counters, Departure, Engine, LaneSnapshot, NoSuchLink, Received};
-pub use packet::{Content, Ecn, Framing, Headers, Join, Malformed, Packet, Unreachable};
+pub use packet::{Content, Ecn, Fragment, Framing, Headers, Join, Malformed, Packet, Unreachable};
 pub use rules::{Decided, Rules};
 pub use run::{Report, Router, RunError, Written};
 pub use side::{AnyDevice, Device, Failed, Interface, OpenError, Sent, Tun, lead_all};

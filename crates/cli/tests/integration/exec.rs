@@ -87,6 +87,17 @@ fn be_inside() {
             let length = udp.recv(&mut answer).unwrap();
             println!("inside: {} {}", String::from_utf8_lossy(&answer[..length]), begin.elapsed().as_millis());
         }
+        // A datagram that is longer than a packet, and its echo.
+        ["long", to] => {
+            let udp = UdpSocket::bind("0.0.0.0:0").unwrap();
+            udp.connect(*to).unwrap();
+            udp.set_read_timeout(Some(PATIENCE)).unwrap();
+            let data = vec![7; 9000];
+            udp.send(&data).unwrap();
+            let mut answer = vec![0; 10_000];
+            let length = udp.recv(&mut answer).unwrap();
+            println!("inside: {}", answer[..length] == data);
+        }
         ["tell", to] => {
             UdpSocket::bind("0.0.0.0:0").unwrap().send_to(b"farewell", *to).unwrap();
         }
@@ -183,6 +194,23 @@ fn datagrams_go_out_and_answers_come_back_and_a_farewell_arrives_after_the_end()
     let mut data = [0; 64];
     let length = server.recv(&mut data).unwrap();
     assert_eq!(&data[..length], b"farewell");
+}
+
+/// The kernel inside cuts a long datagram and puts its echo together, as the gateway does.
+#[test]
+fn a_long_datagram_crosses_the_link_in_fragments() {
+    if !can_run() {
+        return;
+    }
+    let server = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let port = server.local_addr().unwrap().port();
+    thread::spawn(move || {
+        let mut data = vec![0; 10_000];
+        while let Ok((length, from)) = server.recv_from(&mut data) {
+            server.send_to(&data[..length], from).unwrap();
+        }
+    });
+    assert_eq!(said_by(&Desk::new(), "'delay 5ms'", &format!("long 10.0.2.2:{port}")), ["true"]);
 }
 
 /// A name server of the machine answers through the link. Its answer is one address for every name.

@@ -11,6 +11,7 @@
 //! Time is an argument, but the sockets are real: [`Gateway::poll`] asks the system without waiting.
 
 mod address;
+mod fragments;
 mod relay;
 mod tcp;
 #[cfg(test)]
@@ -29,6 +30,7 @@ use rustix::event::{Timespec, epoll};
 
 use address::HOST;
 pub use address::{DNS, GATEWAY, NAMES, PREFIX, host};
+use fragments::Fragments;
 use relay::PIECE;
 use tcp::TcpTable;
 use udp::UdpTable;
@@ -39,6 +41,7 @@ pub struct Gateway {
     sockets: Sockets,
     tcp: TcpTable,
     udp: UdpTable,
+    fragments: Fragments,
     /// Latest instant given by the driver.
     now: Instant,
     /// Packets of kinds that the gateway does not pass on, and damaged packets.
@@ -72,6 +75,8 @@ struct Sockets {
     /// Owners of the sockets, by token. A token is never used again, so that a late event finds no wrong owner.
     owners: BTreeMap<u64, Owner>,
     next_token: u64,
+    /// Identification of the latest datagram that may have been cut.
+    identification: u32,
     /// Name server of the machine.
     names: Option<SocketAddr>,
     /// Packets to the program inside.
@@ -117,11 +122,12 @@ impl Gateway {
             epoll: epoll::create(epoll::CreateFlags::CLOEXEC)?,
             owners: BTreeMap::new(),
             next_token: 0,
+            identification: 0,
             names,
             out: VecDeque::new(),
             buffer: vec![0; PIECE],
         };
-        Ok(Self { sockets, tcp: TcpTable::default(), udp: UdpTable::default(), now: Instant::ZERO, dropped: 0 })
+        Ok(Self { sockets, tcp: TcpTable::default(), udp: UdpTable::default(), fragments: Fragments::default(), now: Instant::ZERO, dropped: 0 })
     }
 
     /// Leads connections and datagrams that arrive at `address` of the real machine to the same port of the host inside.
@@ -174,6 +180,13 @@ impl Gateway {
             self.dropped += 1;
             return;
         };
+        if !headers.is_whole {
+            // A fragment that never finds the others is lost without a count, as on a line.
+            if let Some(whole) = self.fragments.take(self.now, packet) {
+                self.handle_packet(now, &whole);
+            }
+            return;
+        }
         let is_handled = match headers.protocol {
             Protocol::TCP => self.tcp.handle_packet(&mut self.sockets, self.now, packet.bytes()),
             Protocol::UDP => self.udp.handle_packet(&mut self.sockets, self.now, packet),
@@ -213,7 +226,7 @@ impl Gateway {
         self.tcp.is_delivered()
     }
 
-    /// Returns the number of packets from inside that the gateway has not passed on: damaged packets, fragments, and other protocols.
+    /// Returns the number of packets from inside that the gateway has not passed on: damaged packets, and other protocols.
     #[must_use]
     pub const fn dropped(&self) -> u64 {
         self.dropped

@@ -57,7 +57,7 @@ impl UdpTable {
         Ok(())
     }
 
-    /// Handles a packet of UDP from inside. Returns `false` for a packet that is damaged or a fragment.
+    /// Handles a packet of UDP from inside. Returns `false` for a packet that is damaged.
     pub(super) fn handle_packet(&mut self, sockets: &mut Sockets, now: Instant, packet: &Packet) -> bool {
         let (Content::Ip { headers, .. }, Some(data)) = (packet.content(), packet.datagram_data()) else { return false };
         let Some([from, to]) = headers.ports else { return false };
@@ -179,10 +179,12 @@ impl UdpTable {
     }
 }
 
-/// Sends the first `length` bytes of the buffer inside, as a datagram. A datagram beyond the MTU is dropped, as one that may not be fragmented.
+/// Sends the first `length` bytes of the buffer inside, as a datagram, in fragments if the datagram is longer than a packet may be.
 fn deliver(sockets: &mut Sockets, ends: Ends, length: usize) {
     let packet = Packet::datagram(ends.outside, ends.inside, &sockets.buffer[..length]);
-    sockets.out.extend(packet.filter(|packet| packet.bytes().len() <= MTU));
+    // Fragments of two datagrams must differ while both are on the way; a number that counts up repeats after 65,536 datagrams at the earliest.
+    sockets.identification = sockets.identification.wrapping_add(1);
+    sockets.out.extend(packet.into_iter().flat_map(|packet| packet.cut(MTU, sockets.identification)));
 }
 
 /// Tells the program inside why its datagrams do not arrive, as the network would.

@@ -90,7 +90,7 @@ impl Packet {
     }
 
     /// Returns a header of IP before the bytes `segment`, which stay as they are.
-    fn quoted(source: IpAddr, destination: IpAddr, protocol: Protocol, segment: &[u8]) -> Option<Vec<u8>> {
+    pub(super) fn quoted(source: IpAddr, destination: IpAddr, protocol: Protocol, segment: &[u8]) -> Option<Vec<u8>> {
         const TTL: u8 = 64;
         let mut bytes = Vec::with_capacity(40 + segment.len());
         match (source, destination) {

@@ -9,6 +9,7 @@
 
 mod build;
 mod checksum;
+mod fragment;
 mod headers;
 mod segments;
 
@@ -21,6 +22,7 @@ use headers::V4_CHECKSUM;
 
 pub use build::Unreachable;
 pub use cohaptic_units::Ecn;
+pub use fragment::Fragment;
 pub use headers::{Headers, Malformed};
 pub use segments::Join;
 pub(crate) use segments::{cut, join, slices};
