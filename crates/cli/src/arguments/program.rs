@@ -11,7 +11,7 @@ use super::Arguments;
 const GROUPS: [(&str, &[&str]); 5] = [
     ("Commands for scenes", &["init", "run", "check", "explain", "campaign", "compare"]),
     ("Commands for analysis", &["stability", "admittance", "paper"]),
-    ("Commands for networks", &["link", "fit", "relay", "router", "tokio", "test"]),
+    ("Commands for networks", &["link", "fit", "relay", "router", "exec", "tokio", "test"]),
     ("Commands for people and devices", &["play", "study", "live", "join", "falcon"]),
     ("Commands for other programs", &["schema", "completions", "man"]),
 ];

@@ -75,7 +75,7 @@ impl Kind {
             ("PEER", _) => Some(Self::Peer),
             ("SCENE", false) => Some(Self::Shipped),
             ("SCENE", true) => Some(Self::File),
-            (_, true) if matches!(command, "relay" | "router") => Some(Self::File),
+            (_, true) if matches!(command, "relay" | "router") || name == "SPEC | FILE" => Some(Self::File),
             _ => name.starts_with("KEY=").then(|| Self::Keys { many: name.ends_with(",...") }),
         }
     }

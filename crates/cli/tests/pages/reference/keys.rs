@@ -187,7 +187,7 @@ impl Reference {
         let mut own: Vec<&'static Key> = table.keys().collect();
         let within = |one: &[Shape], other: &[Shape]| one.iter().all(|key| other.contains(key));
         // With all keys of another table, or with most of them.
-        let known = self.explained.iter().filter(|known| within(&known.keys, &keys)).max_by_key(|known| known.keys.len());
+        let known = self.explained.iter().filter(|known| !known.keys.is_empty() && within(&known.keys, &keys)).max_by_key(|known| known.keys.len());
         let larger = || self.explained.iter().find(|known| keys.len() >= SHORT && 2 * keys.len() > known.keys.len() && within(&keys, &known.keys));
         if let Some(known) = known.or_else(larger) {
             let missing: Vec<String> = known.keys.iter().filter(|key| !keys.contains(key)).map(|key| format!("`{}`", key.0)).collect();
