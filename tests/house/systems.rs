@@ -29,7 +29,7 @@ const PORTABLE: [&str; 18] = [
 ];
 
 /// Packages of this project that need Linux, and that the program takes there.
-const LINUX: [&str; 4] = ["realtime", "relay", "router", "live"];
+const LINUX: [&str; 5] = ["realtime", "relay", "router", "exec", "live"];
 
 /// Speed against error, which has a program of its own and needs Linux too.
 const ACCURACY: &str = "accuracy";
