@@ -38,6 +38,10 @@ impl DocumentSchema {
     pub(crate) const FALCON_HOME: Self = Self { name: "cohaptic/falcon-home", version: 1 };
     pub(crate) const FALCON_WATCH: Self = Self { name: "cohaptic/falcon-watch", version: 1 };
     pub(crate) const FALCON_SIMULATE: Self = Self { name: "cohaptic/falcon-simulate", version: 1 };
+    pub(crate) const INVERSE3_PROBE: Self = Self { name: "cohaptic/inverse3-probe", version: 1 };
+    pub(crate) const INVERSE3_WATCH: Self = Self { name: "cohaptic/inverse3-watch", version: 1 };
+    pub(crate) const INVERSE3_SIMULATE: Self = Self { name: "cohaptic/inverse3-simulate", version: 1 };
+    pub(crate) const INVERSE3_SERVE: Self = Self { name: "cohaptic/inverse3-serve", version: 1 };
     pub(crate) const LINK: Self = Self { name: "cohaptic/link", version: 1 };
     pub(crate) const PROFILES: Self = Self { name: "cohaptic/profiles", version: 1 };
     pub(crate) const FIT: Self = Self { name: "cohaptic/fit", version: 1 };

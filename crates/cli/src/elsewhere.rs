@@ -43,6 +43,7 @@ pub(crate) mod exec {
 stand_in! {
     without_linux;
     falcon: FalconArguments,
+    inverse3: Inverse3Arguments,
     join: JoinArguments,
     live: LiveArguments,
     play: PlayArguments,
@@ -60,4 +61,10 @@ fn without_driver(command: &str) -> Failure {
 stand_in! {
     without_driver;
     falcon: FalconArguments,
+}
+
+#[cfg(all(target_os = "linux", not(feature = "inverse3")))]
+stand_in! {
+    without_driver;
+    inverse3: Inverse3Arguments,
 }

@@ -5,7 +5,7 @@
 //! Exit status: 0 done, 1 an expectation failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted, 141 standard output was closed.
 #![expect(non_camel_case_types, reason = "`document!` makes a type parameter of each key")]
 #![cfg_attr(not(target_os = "linux"), allow(dead_code, unused_imports, reason = "the commands that need Linux use them"))]
-#![cfg_attr(not(feature = "falcon"), allow(dead_code, unused_imports, reason = "the command of the device uses them"))]
+#![cfg_attr(not(all(feature = "falcon", feature = "inverse3")), allow(dead_code, unused_imports, reason = "the commands of devices use them"))]
 
 mod admittance;
 mod analysis_watch;
@@ -14,8 +14,10 @@ mod campaign;
 mod check;
 mod compare;
 mod completions;
+#[cfg(target_os = "linux")]
+mod device_text;
 mod document_schema;
-#[cfg(not(all(target_os = "linux", feature = "falcon")))]
+#[cfg(not(all(target_os = "linux", feature = "falcon", feature = "inverse3")))]
 mod elsewhere;
 #[cfg(target_os = "linux")]
 mod exec;
@@ -30,6 +32,8 @@ mod fit;
 mod init;
 mod input;
 mod interrupt;
+#[cfg(all(target_os = "linux", feature = "inverse3"))]
+mod inverse3;
 #[cfg(target_os = "linux")]
 mod join;
 mod link;
@@ -60,6 +64,8 @@ use std::process::ExitCode;
 use arguments::{Arguments, Command};
 #[cfg(not(all(target_os = "linux", feature = "falcon")))]
 use elsewhere::falcon;
+#[cfg(not(all(target_os = "linux", feature = "inverse3")))]
+use elsewhere::inverse3;
 #[cfg(not(target_os = "linux"))]
 use elsewhere::{exec, join, live, play, relay, router};
 
@@ -110,6 +116,7 @@ fn main() -> ExitCode {
         Command::Tokio(arguments) => facade::tokio(&arguments),
         Command::Test(arguments) => facade::test(&arguments),
         Command::Falcon(arguments) => falcon::falcon(&arguments),
+        Command::Inverse3(arguments) => inverse3::inverse3(&arguments),
         Command::Link(arguments) => link::link(&arguments),
         Command::Fit(arguments) => fit::fit(&arguments),
         Command::Paper(arguments) => paper::paper(&arguments),

@@ -44,11 +44,15 @@ mod entropy;
 #[cfg(feature = "falcon")]
 pub mod falcons;
 pub mod handshake;
+#[cfg(feature = "inverse3")]
+pub mod inverse3s;
 pub mod join;
 mod key;
 mod label;
 mod place;
 pub mod pointers;
+#[cfg(any(feature = "falcon", feature = "inverse3"))]
+mod scene_hand;
 mod seal;
 mod session;
 

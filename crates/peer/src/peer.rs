@@ -407,6 +407,12 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         self.exchanged.as_deref()
     }
 
+    /// Replaces the exchanges with the device, for a device whose readings are late by themselves. The next tick has an exchange.
+    pub fn set_exchange(&mut self, exchange: Exchange) {
+        self.config.exchange = exchange;
+        self.exchanged = (exchange != Exchange::EACH_TICK).then(|| Box::new(Exchanged::new(self.device.state())));
+    }
+
     /// Replaces readings and force between two exchanges. Without effect with [`Exchange::EACH_TICK`].
     pub fn set_exchanged(&mut self, exchanged: Exchanged<A>) {
         if let Some(present) = &mut self.exchanged {

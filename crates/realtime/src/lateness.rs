@@ -153,7 +153,8 @@ impl Validity {
     #[must_use]
     pub fn reason(&self) -> Option<String> {
         let Self::NotValid { late, of, what, limit } = self else { return None };
-        Some(format!("{late} of {of} {what} were more than {} late, and at most one in a thousand may be", Span(*limit)))
+        let late_by = if limit.is_zero() { "late".to_owned() } else { format!("more than {} late", Span(*limit)) };
+        Some(format!("{late} of {of} {what} were {late_by}, and at most one in a thousand may be"))
     }
 }
 

@@ -3,6 +3,7 @@
 
 use core::fmt;
 use core::time::Duration;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -331,6 +332,8 @@ pub enum PeerKind {
     Udp(Silence),
     /// The copy is simulated in this program; the device is a Novint Falcon in a person's hand.
     Falcon(Silence, FalconSpec),
+    /// The copy is simulated in this program; the device is a Haply Inverse3 in a person's hand.
+    Inverse3(Silence, Inverse3Spec),
     /// Copy and device are simulated in this program; a mouse, a pen, a finger or a stick pulls the device through an arm.
     Pointer(Silence, PointerSpec),
 }
@@ -343,6 +346,7 @@ impl PeerKind {
             Self::Simulated => "simulated",
             Self::Udp(_) => "udp",
             Self::Falcon(..) => "falcon",
+            Self::Inverse3(..) => "inverse3",
             Self::Pointer(..) => "pointer",
         }
     }
@@ -352,14 +356,14 @@ impl PeerKind {
     pub const fn silence(&self) -> Option<Silence> {
         match self {
             Self::Simulated => None,
-            Self::Udp(silence) | Self::Falcon(silence, _) | Self::Pointer(silence, _) => Some(*silence),
+            Self::Udp(silence) | Self::Falcon(silence, _) | Self::Inverse3(silence, _) | Self::Pointer(silence, _) => Some(*silence),
         }
     }
 
     /// Returns true if a live session reads a person's hand at each tick.
     #[must_use]
     pub(crate) const fn is_in_hand(&self) -> bool {
-        matches!(self, Self::Falcon(..) | Self::Pointer(..))
+        matches!(self, Self::Falcon(..) | Self::Inverse3(..) | Self::Pointer(..))
     }
 }
 
@@ -408,6 +412,33 @@ pub enum FalconDevice {
     Simulated,
     /// The device with this serial number.
     Serial(String),
+}
+
+/// Haply Inverse3 of a peer, and the service that speaks for the device.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Inverse3Spec {
+    /// Address of the service, on this machine.
+    pub service: SocketAddr,
+    /// Selects the device.
+    pub device: Inverse3Device,
+    /// Origin of the scene in the coordinates of the device \[m\]; `None` for the middle of the workspace, which needs version 3.5 of the service.
+    pub origin: Option<[f64; 3]>,
+    /// Largest force \[N\]; above zero and at most 10.
+    pub force_limit: f64,
+    /// Age of a reading above which the force is zero; above zero and at most 1 s. `None` for 10 ms or three exchanges, the larger.
+    pub reading_age: Option<Duration>,
+}
+
+/// Selection of an Inverse3.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub enum Inverse3Device {
+    /// The first device of the service not taken by another peer.
+    #[default]
+    First,
+    /// A device simulated down to the messages of its service.
+    Simulated,
+    /// The device with this id.
+    Id(String),
 }
 
 /// A change during the run, in effect before anything else happens at the same instant.

@@ -48,8 +48,9 @@ impl Scene {
         (0..self.peers.len()).find_map(|peer| {
             let (operator, spec) = (self.operator(peer)?, &self.peers[peer]);
             let refuse = |why: String| Some((peer, format!("peer \"{}\": {why}", spec.name)));
-            if matches!(spec.kind, PeerKind::Falcon(..)) {
-                return refuse("an operator moves a device that is simulated here: expected no operator at a Falcon".to_owned());
+            if matches!(spec.kind, PeerKind::Falcon(..) | PeerKind::Inverse3(..)) {
+                let device = if matches!(spec.kind, PeerKind::Falcon(..)) { "a Falcon" } else { "an Inverse3" };
+                return refuse(format!("an operator moves a device that is simulated here: expected no operator at {device}"));
             }
             let Seen::Peer(other) = operator.sees else { return None };
             if self.hears(peer, other) {

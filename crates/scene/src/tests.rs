@@ -2,6 +2,7 @@
 
 mod access;
 mod form;
+mod inverse3;
 mod operators;
 mod slow_devices;
 mod strategies;
@@ -95,7 +96,7 @@ fn an_unknown_key_is_refused_wherever_it_stands() {
         (
             "name = \"left\"",
             "name = \"left\"\ncolour = 1",
-            "14:1: peers.left.colour: unknown key: expected one of name, kind, silence, falcon, pointer, tick, compute-delay, phase, contact",
+            "14:1: peers.left.colour: unknown key: expected one of name, kind, silence, falcon, inverse3, pointer, tick, compute-delay, phase, contact",
         ),
         ("[peer]", "[peer]\nname = \"x\"", "10:1: peer.name: unknown key"),
         ("[link]", "[link]\nduplicat = 0.1", "17:1: link.duplicat: unknown key: expected one of delay, jitter"),

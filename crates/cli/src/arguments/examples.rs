@@ -42,7 +42,7 @@ pub(super) fn after_measurements(examples: &[&str]) -> String {
 
 /// Returns the examples of the program, the meanings of the exit status, and on systems other than Linux the commands that need Linux.
 pub(super) fn of_program() -> String {
-    let needs = if cfg!(target_os = "linux") { "" } else { "\n\nThese commands need Linux: exec, falcon, live, play, relay, router." };
+    let needs = if cfg!(target_os = "linux") { "" } else { "\n\nThese commands need Linux: exec, falcon, inverse3, join, live, play, relay, router." };
     after(PROGRAM) + needs
 }
 
@@ -166,6 +166,18 @@ pub(super) const FALCON_WATCH: &[&str] = &[
 
 pub(super) const FALCON_SIMULATE: &[&str] =
     &["cohaptic falcon simulate", "cohaptic falcon simulate --hand swaying --drop 0.1% --garbage 0.1% --for 10s"];
+
+pub(super) const INVERSE3: &[&str] = &["cohaptic inverse3 probe", "cohaptic inverse3 watch --simulated --for 2s"];
+
+pub(super) const INVERSE3_PROBE: &[&str] = &["cohaptic inverse3 probe", "cohaptic inverse3 probe --device 04C3 --for 5s --json"];
+
+pub(super) const INVERSE3_WATCH: &[&str] =
+    &["cohaptic inverse3 watch --for 10s --csv cursor.csv", "cohaptic inverse3 watch --spring 100 --damping 1 --limit 1"];
+
+pub(super) const INVERSE3_SIMULATE: &[&str] = &[
+    "cohaptic inverse3 simulate --force 0,0,0.5 --fault late=1% --fault restart@3s+500ms",
+    "cohaptic inverse3 simulate --listen 127.0.0.1:10001 --format 3.1",
+];
 
 pub(super) const LINK: &[&str] = &[
     "cohaptic link delay 20ms 5ms 25% loss 1%",

@@ -140,7 +140,7 @@ pub(crate) enum HandName {
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Force(pub(crate) [f64; 3]);
 
-fn force(text: &str) -> Result<Force, String> {
+pub(super) fn force(text: &str) -> Result<Force, String> {
     let parts: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok().filter(|number: &f64| number.is_finite())).collect();
     match parts.as_deref() {
         Some([x, y, z]) => Ok(Force([*x, *y, *z])),
@@ -148,16 +148,16 @@ fn force(text: &str) -> Result<Force, String> {
     }
 }
 
-fn some_time(text: &str) -> Result<Duration, String> {
+pub(super) fn some_time(text: &str) -> Result<Duration, String> {
     let time = parse::duration(text).map_err(|error| error.to_string())?;
     if time.is_zero() { Err("expected a time above zero".to_owned()) } else { Ok(time) }
 }
 
-fn stiffness(text: &str) -> Result<f64, String> {
+pub(super) fn stiffness(text: &str) -> Result<f64, String> {
     within(text, 3000.0, true)
 }
 
-fn damping(text: &str) -> Result<f64, String> {
+pub(super) fn damping(text: &str) -> Result<f64, String> {
     within(text, 20.0, true)
 }
 
@@ -169,7 +169,7 @@ fn strong(text: &str) -> Result<f64, String> {
     within(text, 20.0, false)
 }
 
-fn within(text: &str, most: f64, zero: bool) -> Result<f64, String> {
+pub(super) fn within(text: &str, most: f64, zero: bool) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| (0.0..=most).contains(number) && (zero || *number > 0.0));
     number.ok_or_else(|| format!("expected a number {} {most}", if zero { "from 0 to" } else { "above 0 and up to" }))
 }

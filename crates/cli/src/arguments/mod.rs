@@ -5,6 +5,7 @@ mod examples;
 mod exec;
 mod existing;
 mod falcon;
+mod inverse3;
 mod join;
 mod links;
 mod numbers;
@@ -29,6 +30,10 @@ pub(crate) use exec::ExecArguments;
 pub(crate) use existing::{TestArguments, TokioArguments};
 pub(crate) use falcon::{
     FalconArguments, FalconCommand, Force, HandName, HomeArguments, ProbeArguments, SimulateArguments, WatchArguments, WhichFalcon,
+};
+pub(crate) use inverse3::{
+    FaultText, FaultWhen, FormatName, Inverse3Arguments, Inverse3Command, Inverse3ProbeArguments, Inverse3SimulateArguments, Inverse3WatchArguments,
+    WhichInverse3,
 };
 pub(crate) use join::{JoinArguments, JoinDevice};
 pub(crate) use links::{EcnKind, FitArguments, LinkArguments, Profile};
@@ -91,6 +96,9 @@ pub(crate) enum Command {
     Test(TestArguments),
     /// Looks at a Novint Falcon, homes it, watches and pushes it, or simulates one
     Falcon(FalconArguments),
+    /// Looks at a Haply Inverse3, watches and pushes it, or simulates it and its service
+    #[command(name = "inverse3")]
+    Inverse3(Inverse3Arguments),
     /// Sends a steady stream over one link and compares the result with the configuration
     Link(LinkArguments),
     /// Estimates the link that made a file of measurements, captures or fates

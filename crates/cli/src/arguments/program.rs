@@ -12,7 +12,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Commands for scenes", &["init", "run", "check", "explain", "campaign", "compare"]),
     ("Commands for analysis", &["stability", "admittance", "paper"]),
     ("Commands for networks", &["link", "fit", "relay", "router", "exec", "tokio", "test"]),
-    ("Commands for people and devices", &["play", "study", "live", "join", "falcon"]),
+    ("Commands for people and devices", &["play", "study", "live", "join", "falcon", "inverse3"]),
     ("Commands for other programs", &["schema", "completions", "man"]),
 ];
 

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use cohaptic_falcon::driver::{Phase, Status};
-use cohaptic_falcon::kinematics::Triple;
 use cohaptic_falcon::protocol::{Buttons, Leds};
 use cohaptic_falcon::safety::ZeroCause;
 use serde::Serialize;
 
 use super::bench::{Bench, End};
 use super::reach::{FirmwareState, Target};
+pub(super) use crate::device_text::{block, length, place};
 use crate::document_schema::micros;
 use crate::realtime::counts;
 
@@ -193,28 +193,4 @@ pub(super) fn forces(forces: &Forces) -> String {
     let changed = words(&[("limited", *limited), ("slowed", *slewed), ("more than a motor gives", *saturated)]);
     let zeroed = words(&zeroed.iter().map(|(cause, count)| (*cause, *count)).collect::<Vec<_>>());
     format!("largest force {largest_n:.3} N, limit {limit_n} N; forces changed: {changed}; set to zero: {zeroed}")
-}
-
-/// Formats a position \[m\] in millimetres, such as `x 1.2 mm, y -3.0 mm, z 45.6 mm`.
-pub(super) fn place(position: Triple) -> String {
-    // Rounded here, because -0.04 would be shown as -0.0.
-    let [x, y, z] = position.map(|part| (1e4 * part).round() / 10.0 + 0.0);
-    format!("x {x:.1} mm, y {y:.1} mm, z {z:.1} mm")
-}
-
-/// Returns a text of `title` and, indented below the title, `lines`.
-pub(super) fn block(title: &str, lines: &[String]) -> String {
-    let mut text = format!("{title}\n");
-    for line in lines {
-        text.push_str("  ");
-        text.push_str(line);
-        text.push('\n');
-    }
-    text
-}
-
-/// Returns the Euclidean length of a vector, in the unit of the vector.
-pub(super) fn length(vector: Triple) -> f64 {
-    let [x, y, z] = vector;
-    x.hypot(y).hypot(z)
 }

@@ -1,14 +1,12 @@
 //! `cohaptic falcon watch`: reads a device continuously, and optionally applies a constant force or a spring to the grip.
 
-use std::io::{self, IsTerminal as _, Write as _};
-use std::path::Path;
+use std::io::{self, IsTerminal as _};
 use std::process::ExitCode;
 use std::time::Duration;
 
 use cohaptic_falcon::driver::{DriverConfig, Phase, Reading, Status};
 use cohaptic_falcon::kinematics::Triple;
 use cohaptic_falcon::safety::Limits;
-use cohaptic_files::WholeFile;
 use serde::Serialize;
 
 use super::answer::{self, Forces, Identity, Seen, Traffic, buttons};
@@ -16,9 +14,9 @@ use super::bench::{Bench, End, Go, Task};
 use super::home::Guide;
 use super::reach;
 use crate::arguments::{Force, WatchArguments};
+use crate::device_text::{SamplesFile, print_row, ruler};
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
-use crate::file::unwritten;
 use crate::output;
 use crate::progress::Progress;
 
@@ -180,7 +178,7 @@ impl Watching {
             push,
             guide: Guide::new(push != Push::Nothing),
             line: Progress::new(0, "{msg}"),
-            file: arguments.csv.as_deref().map(SamplesFile::create).transpose()?,
+            file: arguments.csv.as_deref().map(|path| SamplesFile::create(path, HEADER)).transpose()?,
             prints_rows,
             next_look: Duration::ZERO,
             last,
@@ -252,29 +250,6 @@ fn shown(at: Duration, status: &Status) -> String {
     format!("{text}\n  speed {:.3} m/s", answer::length(velocity))
 }
 
-/// Half of the length of a ruler \[mm\]. The grip of a Falcon moves by about this length to either side of the origin.
-const REACH_MM: f64 = 60.0;
-/// Number of places of a ruler. Odd, so that the origin has a place.
-const PLACES: u8 = 31;
-
-/// Returns a ruler with the grip at `place` \[mm\] and the origin in the middle. A place beyond the ends is shown at the end.
-fn ruler(place: f64) -> String {
-    let last = f64::from(PLACES - 1);
-    // Place 0 is `-REACH_MM`, the middle place is the origin, and the last place is `REACH_MM`.
-    let grip = ((place / REACH_MM + 1.0) * 0.5 * last).round().clamp(0.0, last);
-    (0..PLACES)
-        .map(|at| {
-            if (f64::from(at) - grip).abs() < 0.5 {
-                'o'
-            } else if at == PLACES / 2 {
-                '|'
-            } else {
-                '-'
-            }
-        })
-        .collect()
-}
-
 /// Header of the CSV rows. Times are in s, positions in m, velocities in m/s, forces in N. Unknown values are empty.
 pub(super) const HEADER: &str = "t,phase,homed,encoder1,encoder2,encoder3,x,y,z,vx,vy,vz,fx,fy,fz,buttons";
 
@@ -303,39 +278,6 @@ fn rounded(status: &Status) -> Status {
     Status { reading, force: millionths(status.force), ..*status }
 }
 
-/// A CSV file of rows, which appears under its name only when [`finish`](Self::finish) is called.
-pub(super) struct SamplesFile {
-    file: WholeFile,
-}
-
-impl SamplesFile {
-    pub(super) fn create(path: &Path) -> Result<Self, Failure> {
-        let create = || {
-            let mut file = WholeFile::create(path)?;
-            writeln!(file, "{HEADER}")?;
-            Ok(Self { file })
-        };
-        create().map_err(unwritten(path))
-    }
-
-    pub(super) fn write(&mut self, row: &str) -> Result<(), Failure> {
-        let written = writeln!(self.file, "{row}");
-        written.map_err(unwritten(self.file.path()))
-    }
-
-    /// Completes the file under its name, and returns the path for messages.
-    pub(super) fn finish(self) -> Result<String, Failure> {
-        let path = self.file.path().to_path_buf();
-        self.file.finish().map_err(unwritten(&path))?;
-        Ok(output::path(&path))
-    }
-}
-
-/// Prints a row to standard output at once, without waiting for more rows.
-pub(super) fn print_row(row: &str) -> Result<(), Failure> {
-    output::raw(format!("{row}\n").as_bytes())
-}
-
 #[cfg(test)]
 mod tests {
     use cohaptic_falcon::driver::{Driver, DriverConfig};
@@ -346,11 +288,6 @@ mod tests {
 
     #[test]
     fn people_see_where_the_grip_is() {
-        assert_eq!(ruler(0.0), "---------------o---------------");
-        assert_eq!(ruler(-20.0), "----------o----|---------------");
-        // The last place to the right is that of all places beyond.
-        assert_eq!((ruler(60.0), ruler(400.0)), (ruler(400.0), "---------------|--------------o".to_owned()));
-        assert_eq!(ruler(-60.0), "o--------------|---------------");
         let simulator = Simulator::new(SimulatorConfig { running: true, ..SimulatorConfig::default() }, StillHand);
         let driver = Driver::open(SimulatedTransport::in_virtual_time(simulator), DriverConfig::DEFAULT).unwrap();
         let unknown = shown(Duration::ZERO, driver.status());

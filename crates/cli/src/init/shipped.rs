@@ -107,6 +107,7 @@ shipped![
     "network/two-axes",
     "live/play",
     "live/three-falcons",
+    "live/two-inverse3s",
     "live/two-and-a-program",
     "rigid/damped-spin",
     "rigid/damping-bound",

@@ -114,7 +114,7 @@ fn open_device(arguments: &JoinArguments, scene: &Scene, place: usize) -> Result
             if let Some(error) = devices::undriven(&own, &here(arguments)) {
                 return Err(error.into());
             }
-            let Some(mut devices) = devices::ready(&own, arguments.firmware.as_deref(), arguments.pace.wishes())? else { return Ok(None) };
+            let Some((mut devices, _)) = devices::ready(&own, arguments.firmware.as_deref(), arguments.pace.wishes())? else { return Ok(None) };
             // Without this check a kind without a driver would be simulated, and the hand would feel nothing.
             let device =
                 devices[place].take().ok_or_else(|| Failure::System(format!("--device {}: no driver opened it", arguments.device.kind())))?;

@@ -12,13 +12,14 @@ use cohaptic_scene::Scene;
 use cohaptic_units::print::{Counted, Span};
 use serde::Serialize;
 
+use super::exchanges::DeviceReport;
 use crate::document_schema::{document, lateness, micros};
 use crate::output;
 use crate::realtime::{late, notes};
 use crate::run::answer::{diverged, length, packets};
 
 /// Returns the answer of `cohaptic live --json`.
-pub(super) fn of(scene: &Scene, report: &Report) -> impl Serialize {
+pub(super) fn of(scene: &Scene, report: &Report, devices: &[DeviceReport]) -> impl Serialize {
     let summary = &report.summary;
     let peers = summary.peers.iter().enumerate().map(|(place, summary)| {
         document! {
@@ -29,6 +30,8 @@ pub(super) fn of(scene: &Scene, report: &Report) -> impl Serialize {
             seat: report.seats[place].as_ref().map(|seat| document! { seat: of_seat(seat) }),
             #[serde(flatten)]
             gate: report.gates[place].as_ref().map(|gate| document! { gate: of_gate(gate) }),
+            #[serde(flatten)]
+            exchanges: devices.iter().find(|device| device.peer == place).map(|device| document! { exchanges: &device.exchanges }),
         }
     });
     document! {
@@ -93,7 +96,7 @@ fn of_admission(stats: &AdmissionStats, socket: &SocketCounts) -> impl Serialize
     }
 }
 
-pub(super) fn describe(scene: &Scene, report: &Report) -> String {
+pub(super) fn describe(scene: &Scene, report: &Report, devices: &[DeviceReport]) -> String {
     let mut text = format!("{}\n", scene.title);
     let mut line = |line: String| text.push_str(&format!("  {line}\n"));
     let summary = &report.summary;
@@ -120,6 +123,11 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
         line(format!("{} ({}) ends at {}{seat}{way}", peer.name, spec.kind.name(), position.join(", ")));
     }
     report.gates.iter().zip(&scene.peers).filter_map(|(gate, spec)| without_force(&spec.name, gate.as_ref()?)).for_each(&mut line);
+    for DeviceReport { peer, exchanges, error, .. } in devices {
+        let name = &scene.peers[*peer].name;
+        exchanges.lines().into_iter().for_each(|said| line(format!("device of {name}: {said}")));
+        error.iter().for_each(|error| line(format!("device of {name}: ERROR: {error}")));
+    }
     line(packets(summary));
     report.task.iter().for_each(|task| line(format!("task: {}", task_words(task, scene))));
     measured_lines(scene, &report.measures).into_iter().for_each(&mut line);

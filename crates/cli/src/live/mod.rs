@@ -2,6 +2,7 @@
 
 pub(crate) mod answer;
 pub(crate) mod devices;
+mod exchanges;
 pub(crate) mod onlookers;
 mod page;
 
@@ -28,6 +29,7 @@ use crate::progress::Progress;
 use crate::realtime::{ControlFiles, KeyedLinks, LiveControl, own_address, say};
 use crate::run::page::edits;
 use crate::{input, interrupt, output};
+use exchanges::DeviceFacts;
 use onlookers::SessionConductor;
 use onlookers::{Elapsed, Planned, TimedLinks};
 use page::Played;
@@ -91,21 +93,24 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let timeline = edits(&content.keys);
     let _own = arguments.out.as_deref().map(own_folder).transpose()?;
     let session = open(arguments, &scene, content, identity)?;
-    let Some(session) = session else { return Ok(ExitCode::from(INTERRUPTED)) };
+    let Some((session, facts)) = session else { return Ok(ExitCode::from(INTERRUPTED)) };
     announce(&scene, session.address(), arguments.key_file.is_some().then_some(identity));
     let control = LiveControl::open(&arguments.real_time, onlookers::description(&scene, &pairs), Box::new(editor))?;
     let (others, strangers) = channel();
     let host = SessionConductor::new(control.look(), wanted, pairs, elapsed, scene.axes.count(), others);
     let mut report = conduct(&scene, session, host, &control, &strangers)?;
+    // The session has dropped its devices, so that their facts are whole.
+    let devices = facts.reports(&scene);
+    report.validity = exchanges::judge(report.validity, &devices);
     if let Some(folder) = &arguments.out {
         let file = folder.join("live.html");
         write_file(&file, page::html(arguments, path, &Played { scene: &scene, text: &text, overrides, timeline: &timeline }, &report))?;
         report.files.push(file);
     }
     if arguments.json {
-        output::json(DocumentSchema::LIVE, &answer::of(&scene, &report))?;
+        output::json(DocumentSchema::LIVE, &answer::of(&scene, &report, &devices))?;
     } else {
-        let mut text = answer::describe(&scene, &report);
+        let mut text = answer::describe(&scene, &report, &devices);
         if let Some(folder) = &arguments.out {
             let set: String = overrides.iter().map(|key| format!(" --set '{key}'")).collect();
             let _ = writeln!(text, "  replay: cohaptic run {}{set} --inputs {}", path.display(), folder.join("inputs.csv").display());
@@ -117,7 +122,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
 }
 
 /// Opens the key, the devices and the sockets before the time of the session begins. Returns `None` if the user asked for the end while waiting.
-fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent, identity: Fingerprint) -> Result<Option<Session>, Failure> {
+fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent, identity: Fingerprint) -> Result<Option<(Session, DeviceFacts)>, Failure> {
     let real_time = &arguments.real_time;
     // The key is read first: a wrong file is refused before devices are homed.
     let key = match &arguments.key_file {
@@ -136,8 +141,8 @@ fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent, identit
         ..SessionConfig::new(arguments.listen)
     };
     // Simulated devices take time to home. The sockets are opened afterwards, so that peers find a session that is about to begin.
-    let Some(mut devices) = devices::ready(scene, arguments.firmware.as_deref(), real_time.pace.wishes())? else { return Ok(None) };
-    Session::open(scene, config, |peer| devices[peer].take()).map(Some).map_err(refused)
+    let Some((mut devices, facts)) = devices::ready(scene, arguments.firmware.as_deref(), real_time.pace.wishes())? else { return Ok(None) };
+    Session::open(scene, config, |peer| devices[peer].take()).map(|session| Some((session, facts))).map_err(refused)
 }
 
 fn conduct(

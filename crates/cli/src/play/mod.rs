@@ -108,7 +108,7 @@ fn check(played: &PlayedScene) -> Result<(), Failure> {
     if !PEERS.contains(&scene.peers.len()) {
         return refuse(format!("peers: {} of them: expected {} to {}", scene.peers.len(), PEERS.start(), PEERS.end()));
     }
-    if let Some(peer) = scene.peers.iter().find(|peer| matches!(peer.kind, PeerKind::Udp(_) | PeerKind::Falcon(..))) {
+    if let Some(peer) = scene.peers.iter().find(|peer| matches!(peer.kind, PeerKind::Udp(_) | PeerKind::Falcon(..) | PeerKind::Inverse3(..))) {
         let kind = peer.kind.name();
         let name = &peer.name;
         return refuse(format!(
@@ -286,6 +286,7 @@ mod tests {
             ("coordination/topology-star.toml", "topology"),
             ("counterexamples/wave-held.toml", "timeline"),
             ("live/three-falcons.toml", "kind=pointer"),
+            ("live/two-inverse3s.toml", "kind=pointer"),
             ("live/two-and-a-program.toml", "kind=pointer"),
             ("network/push-contact.toml", "timeline"),
             ("network/timeline.toml", "timeline"),

@@ -25,6 +25,7 @@ fn a_document_names_its_schema_and_version_before_all_else() {
         ("link delay 20ms 2ms --packets 1000 --fates fates.csv --json", "cohaptic/link"),
         ("fit fates.csv --json", "cohaptic/fit"),
         ("falcon simulate --for 10ms --json", "cohaptic/falcon-simulate"),
+        ("inverse3 simulate --for 10ms --json", "cohaptic/inverse3-simulate"),
     ] {
         let text = desk.text(line);
         assert!(text.starts_with(&format!("{{\n  \"schema\": \"{schema}\",\n  \"version\": 1,\n")), "{line}: {text}");

@@ -33,6 +33,8 @@ mod fit_programs;
 mod help;
 #[cfg(unix)]
 mod interrupt;
+#[cfg(all(target_os = "linux", feature = "inverse3"))]
+mod inverse3;
 #[cfg(target_os = "linux")]
 mod join;
 mod link;

@@ -196,7 +196,7 @@ fn read_row(line: usize, row: &str, scene: &Scene, keys: &LinkKeys, folder: &Pat
     let at = cells.instant()?;
     let what = match cells.cells[1] {
         "sample" => Recorded::Sample { peer: cells.peer(2, scene, &["udp"])?, datagram: cells.bytes()? },
-        "device" => Recorded::Device { peer: cells.peer(2, scene, &["falcon", "pointer"])?, state: cells.state(scene.axes.count())? },
+        "device" => Recorded::Device { peer: cells.peer(2, scene, &["falcon", "inverse3", "pointer"])?, state: cells.state(scene.axes.count())? },
         "link" => {
             let (from, to) = (cells.peer(2, scene, &[])?, cells.peer(3, scene, &[])?);
             // A peer has no link to itself.

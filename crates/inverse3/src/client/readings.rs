@@ -1,4 +1,4 @@
-//! What replies tell of a device: its place in the list, its configuration, its readings.
+//! Place of a device in the list of its service, its configuration, and its readings, as replies tell them.
 
 use cohaptic_device::Reading;
 use cohaptic_units::Instant;
@@ -101,8 +101,10 @@ impl Client {
         }
         self.place = Some((position, now));
         let origin = self.config.origin.unwrap_or_default();
-        let position = to_scene(core::array::from_fn(|axis| position[axis] - origin[axis]));
-        let reading = Reading { position, velocity: to_scene(velocity) };
+        // The negative of zero would be shown as `-0`.
+        let plain = |vector| to_scene(vector).map(|part| part + 0.0);
+        let position = plain(core::array::from_fn(|axis| position[axis] - origin[axis]));
+        let reading = Reading { position, velocity: plain(velocity) };
         // When the service read the device is not known: the age counts from the message, at which the device had not been read yet.
         self.reading = Some((reading, sent));
         self.exchanges.note(now, sent, force.map(to_scene), self.config.exchange);

@@ -1,4 +1,4 @@
-//! What a client shows of a device.
+//! State of a device as a client shows it: phase, reading, force.
 
 use core::fmt;
 

@@ -42,7 +42,7 @@ pub struct Summary {
     pub device: Option<String>,
     /// Version of the service, if the service told one.
     pub version: Option<Version>,
-    /// `true` while events of the service arrive. Without events, nobody hears of an emergency brake.
+    /// `true` if events of the service can arrive. Without events, nobody hears of an emergency brake.
     pub hears_events: bool,
     /// Reason why the device cannot be used.
     pub refusal: Option<Refusal>,
@@ -105,6 +105,7 @@ impl Inverse3 {
             service,
             wire: None,
             events: None,
+            hears_events: false,
             woken,
             seen: 0,
             is_stopping: false,
@@ -196,6 +197,8 @@ struct Driving {
     service: SocketAddr,
     wire: Option<Wire>,
     events: Option<Wire>,
+    /// `true` if events could arrive up to the end of the latest connection.
+    hears_events: bool,
     woken: UnixStream,
     /// Number of the newest force taken from the session.
     seen: u64,
@@ -271,7 +274,10 @@ impl Driving {
                     }
                 }
                 Ok(None) => break,
-                Err(_) => self.events = None,
+                Err(_) => {
+                    self.events = None;
+                    self.hears_events = false;
+                }
             }
         }
     }
@@ -287,6 +293,7 @@ impl Driving {
                         self.error = None;
                         // A service without events is used without.
                         self.events = events_of(self.service).and_then(|address| Wire::connect(address).ok());
+                        self.hears_events = self.events.is_some();
                         self.client.connected(self.clock.now(), version);
                     }
                     Err(error) => {
@@ -323,7 +330,7 @@ impl Driving {
             report: self.client.report(),
             device: self.client.device().map(str::to_owned),
             version: self.client.version(),
-            hears_events: self.events.is_some(),
+            hears_events: self.hears_events,
             refusal: self.client.refusal(),
             error: self.error.clone(),
         };

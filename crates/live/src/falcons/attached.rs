@@ -7,7 +7,7 @@ use cohaptic_falcon::device::FalconDevice;
 use cohaptic_falcon::driver::Phase;
 use cohaptic_units::Instant;
 
-use super::hand::Beginning;
+use crate::scene_hand::Beginning;
 
 /// Readiness of a Falcon for a session.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -22,8 +22,9 @@ use cohaptic_falcon::usb::{UsbError, UsbTransport};
 use cohaptic_realtime::{Wishes, prepare_thread};
 use cohaptic_scene::{FalconDevice as Which, FalconSpec, PeerKind, PeerSpec, Scene};
 
+use crate::scene_hand::Beginning;
 use attached::Attached;
-use hand::{Beginning, SceneHand};
+use hand::SceneHand;
 
 pub use attached::Readiness;
 

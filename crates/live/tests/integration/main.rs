@@ -11,6 +11,8 @@ mod examples;
 mod falcons;
 mod floods;
 mod hostile;
+#[cfg(feature = "inverse3")]
+mod inverse3s;
 mod join;
 mod key_files;
 mod keyed;

@@ -3,18 +3,19 @@
 use core::time::Duration;
 
 use cohaptic_linkfile::document::{Node, Value, quote};
+use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, values};
 use cohaptic_linkfile::schema::{Choices, Form, Table, number, optional, required, somewhere, usual, vector, words};
 use cohaptic_peer::rotation::Spin;
 use cohaptic_peer::{Contact, DeviceConfig, Direction, Drift, Exchange, Gains};
-use cohaptic_units::print::Span;
+use cohaptic_units::print::{Counted, Span};
 
 use super::MOST;
 use super::coordination::{SCALING, SCALINGS};
 use super::rotation::{read_coupling_rotation, read_device_rotation};
 use crate::context::{SceneContext, check_axis};
 use crate::model::Scaling;
-use crate::quantities::{DAMPING, INERTIA, MASS, ROTATIONAL_DAMPING, ROTATIONAL_STIFFNESS, STIFFNESS};
+use crate::quantities::{DAMPING, INERTIA, MASS, POSITION, ROTATIONAL_DAMPING, ROTATIONAL_STIFFNESS, STIFFNESS};
 
 pub(super) static DEVICE: Table = Table::of(&[&[
     somewhere("mass", number(MASS), "Mass of the device"),
@@ -84,6 +85,19 @@ fn read_direction(node: &Node, context: SceneContext<'_>) -> Option<Direction> {
     Some(direction)
 }
 
+/// Reads the origin of a device: three numbers, because a device has three axes, however many the scene has.
+pub(super) fn read_origin(node: &Node, context: Context<'_>) -> Option<[f64; 3]> {
+    const EXPECTED: &str = "a list of three numbers [m], a place in the coordinates of the device";
+    let elements = values::list(node, context, EXPECTED)?;
+    let [x, y, z] = elements.as_slice() else {
+        context.fault_at(node, format!("found a list of {}: expected {EXPECTED}", Counted(elements.len(), "number")));
+        return None;
+    };
+    let read = |node| POSITION.read(node, context);
+    let (x, y, z) = (read(x), read(y), read(z));
+    Some([x?, y?, z?])
+}
+
 /// Longest time between two exchanges with a device. A force that acts for longer is no coupling any more, and drivers of devices end such a force.
 const LONGEST_EXCHANGE: Duration = Duration::from_millis(100);
 
@@ -105,6 +119,8 @@ pub(super) struct ExchangeLimits {
     pub(super) compute_delay: bool,
     /// `true` if the object turns.
     pub(super) turns: bool,
+    /// `true` if readings are late unless the scene says otherwise.
+    pub(super) late: bool,
 }
 
 /// Reads a device.
@@ -112,19 +128,28 @@ pub(super) fn read_device(node: &Node, context: Context<'_>, limits: ExchangeLim
     let mut table = TableReader::new(node, context, &DEVICE, expected)?;
     let (mass, damping) = (table.value("mass"), table.value("damping"));
     let turned = read_device_rotation(&mut table);
-    let exchange = read_exchange(&mut table, context, limits);
+    let exchange = read_exchange(&mut table, node, context, limits);
     table.finish();
     Some(DeviceRead { config: DeviceConfig { mass: mass?, damping: damping? }, exchange: exchange?, turned: turned? })
 }
 
 /// Reads the exchanges with a device, within the limits of its peer.
-fn read_exchange(table: &mut TableReader<'_>, context: Context<'_>, limits: ExchangeLimits) -> Option<Exchange> {
+fn read_exchange(table: &mut TableReader<'_>, node: &Node, context: Context<'_>, limits: ExchangeLimits) -> Option<Exchange> {
     let nodes = ["exchange-every", "exchange-age"].map(|key| table.get(key));
     let (every, age): (Option<u64>, Option<u64>) = (table.value("exchange-every"), table.value("exchange-age"));
-    let exchange = Exchange { every: u32::try_from(every?).unwrap_or(u32::MAX), late: age? == 1 };
-    // The key that makes the device slow is the place of a fault.
     let [of_every, of_age] = nodes;
-    let Some(node) = of_every.filter(|_| exchange.holds()).or_else(|| of_age.filter(|_| exchange.late)) else { return Some(exchange) };
+    let late = if of_age.is_none() { limits.late } else { age? == 1 };
+    let exchange = Exchange { every: u32::try_from(every?).unwrap_or(u32::MAX), late };
+    // The key that makes the device slow is the place of a fault.
+    let place = of_every.filter(|_| exchange.holds()).or_else(|| of_age.filter(|_| exchange.late)).unwrap_or(node);
+    check_exchange(exchange, place, context, limits)
+}
+
+/// Returns the exchanges if a peer within `limits` can have them; else reports a fault at `node`.
+pub(super) fn check_exchange(exchange: Exchange, node: &Node, context: Context<'_>, limits: ExchangeLimits) -> Option<Exchange> {
+    if exchange == Exchange::EACH_TICK {
+        return Some(exchange);
+    }
     if limits.compute_delay {
         context.fault_at(
             node,

@@ -1,16 +1,17 @@
-//! Readers of `kind`, `silence`, `falcon` and `pointer` of a peer: the place where the peer runs.
+//! Readers of `kind`, `silence`, `falcon`, `inverse3` and `pointer` of a peer: the place where the peer runs.
 
 use cohaptic_linkfile::document::{Node, quote};
-use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, defaults, values};
 use cohaptic_linkfile::schema::{Choices, Form, Table, number, usual, words};
 use cohaptic_peer::DeviceConfig;
-use cohaptic_units::print::Counted;
 
+use super::device::read_origin;
+use super::inverse3::read_inverse3;
 use crate::model::{FalconDevice, FalconSpec, PeerKind, PointerSpec, Silence};
 use crate::quantities::{DAMPING, POSITION, POSITIVE_COUNTS, POSITIVE_FORCE, STIFFNESS};
 
-/// Model of a Falcon in Rakhsha & Constantinescu (2015): mass 0.1 kg, damping 5 N·s/m. For virtual time, and for the device of a pointer.
+/// Model of a Falcon in Rakhsha & Constantinescu (2015): mass 0.1 kg, damping 5 N·s/m. For virtual time, for the device of a pointer, and for a simulated Inverse3 in
+/// a live session.
 pub(crate) const FALCON_DEVICE: DeviceConfig = DeviceConfig { mass: 0.1, damping: 5.0 };
 
 /// Device of a peer elsewhere, if the scene gives no device. Nobody moves this device, and the device touches nothing.
@@ -21,13 +22,15 @@ enum Word {
     Simulated,
     Udp,
     Falcon,
+    Inverse3,
     Pointer,
 }
 
-const KINDS: Choices<Word, 4> = [
+const KINDS: Choices<Word, 5> = [
     ("simulated", Word::Simulated, "simulated here"),
     ("udp", Word::Udp, "another program, which sends and receives samples"),
     ("falcon", Word::Falcon, "simulated here, with a Novint Falcon"),
+    ("inverse3", Word::Inverse3, "simulated here, with a Haply Inverse3"),
     ("pointer", Word::Pointer, "simulated here, pulled by a mouse, a finger or a stick"),
 ];
 pub(super) const KIND: Form = Form::Words(const { &words(&KINDS) });
@@ -75,18 +78,20 @@ impl Default for FalconSpec {
     }
 }
 
-/// Reads the four keys. All but `kind` may come from `[peer]`: they are checked for every peer, and have no effect on a peer of another kind.
+/// Reads the five keys. All but `kind` may come from `[peer]`: they are checked for every peer, and have no effect on a peer of another kind.
 pub(crate) fn read_kind(table: &mut TableReader<'_>) -> Option<PeerKind> {
     let word = table.choice("kind", &KINDS);
     let silence = table.table("silence", read_silence);
     let falcon = table.table("falcon", read_falcon);
+    let inverse3 = table.table("inverse3", read_inverse3);
     let pointer = table.table("pointer", read_pointer);
-    // All three are read before the first `?`, so that the faults of all tables are reported.
-    let (silence, falcon, pointer) = (silence?, falcon?, pointer?);
+    // All four are read before the first `?`, so that the faults of all tables are reported.
+    let (silence, falcon, inverse3, pointer) = (silence?, falcon?, inverse3?, pointer?);
     Some(match word? {
         Word::Simulated => PeerKind::Simulated,
         Word::Udp => PeerKind::Udp(silence),
         Word::Falcon => PeerKind::Falcon(silence, falcon),
+        Word::Inverse3 => PeerKind::Inverse3(silence, inverse3),
         Word::Pointer => PeerKind::Pointer(silence, pointer),
     })
 }
@@ -128,17 +133,4 @@ fn read_device(node: &Node, context: Context<'_>) -> Option<FalconDevice> {
             None
         }
     }
-}
-
-/// Reads the origin of a device: three numbers, because a device has three axes, however many the scene has.
-fn read_origin(node: &Node, context: Context<'_>) -> Option<[f64; 3]> {
-    const EXPECTED: &str = "a list of three numbers [m], a place in the coordinates of the device";
-    let elements = values::list(node, context, EXPECTED)?;
-    let [x, y, z] = elements.as_slice() else {
-        context.fault_at(node, format!("found a list of {}: expected {EXPECTED}", Counted(elements.len(), "number")));
-        return None;
-    };
-    let read = |node| POSITION.read(node, context);
-    let (x, y, z) = (read(x), read(y), read(z));
-    Some([x?, y?, z?])
 }

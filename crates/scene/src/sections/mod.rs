@@ -8,6 +8,7 @@ mod device;
 mod expect;
 mod hand;
 mod header;
+mod inverse3;
 mod kind;
 mod measure;
 mod motion_file;

@@ -10,8 +10,11 @@ use cohaptic_units::print::Span;
 
 use super::MOST;
 use super::access::{ACCESS, Access, read_access};
-use super::device::{A_COUPLING, CLOCK, CONTACT, COUPLING, DEVICE, ExchangeLimits, read_clock, read_contact, read_coupling, read_device};
+use super::device::{
+    A_COUPLING, CLOCK, CONTACT, COUPLING, DEVICE, ExchangeLimits, check_exchange, read_clock, read_contact, read_coupling, read_device,
+};
 use super::hand::{HAND, hand_is_sampled, read_hand, read_hand_torque};
+use super::inverse3::INVERSE3;
 use super::kind::{FALCON, FALCON_DEVICE, KIND, POINTER, SILENCE, STILL_DEVICE, read_kind};
 use super::rotation::{PeerRotationKeys, QUATERNION, read_peer_rotation};
 use crate::context::SceneContext;
@@ -26,7 +29,7 @@ pub(crate) static PEERS: Table = Table::over(&[
     &KEYS,
     &ACCESS,
 ]);
-const KEYS: [Key; 19] = [
+const KEYS: [Key; 20] = [
     somewhere("device", Form::Table(&DEVICE), "Haptic device of the peer"),
     somewhere("coupling", Form::Table(&COUPLING), "Spring and damper between device and copy; not needed where contact is none"),
     usual("contact", CONTACT, "\"grasp\"", "Contact between the device and the object"),
@@ -47,6 +50,7 @@ const KEYS: [Key; 19] = [
     usual("kind", KIND, "\"simulated\"", "Place of the peer in a live session"),
     optional("silence", Form::Table(&SILENCE), "Fading of the pull of a silent peer in another program"),
     optional("falcon", Form::Table(&FALCON), "Falcon of a peer of kind falcon, or of kind udp for cohaptic join, and the meaning of its numbers"),
+    optional("inverse3", Form::Table(&INVERSE3), "Inverse3 of a peer of kind inverse3, or of kind udp for cohaptic join, and its service"),
     optional("pointer", Form::Table(&POINTER), "Arm through which a pointer pulls the device of a peer of kind pointer"),
 ];
 
@@ -81,6 +85,8 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
     const A_DEVICE: &str = "a table such as { mass = 0.1, damping = 5.0 }";
     const UDP_DEVICE: &str = "a table such as { mass = 0.1, damping = 5.0 }, from which this peer of kind \"udp\", another process, can be simulated; \
         `cohaptic live` runs the scene without it, with the process itself";
+    const INVERSE3_DEVICE: &str = "a table such as { mass = 0.1, damping = 5.0 }, from which this peer of kind \"inverse3\" can be simulated: no mass of the device \
+        is published; `cohaptic live` runs the scene without it, with the device itself";
     let mut table = TableReader::new(node, *context, declaration, "a table of keys of a peer")?;
     if declaration.key("name").is_some() {
         // Marks the key as known. The module `peers` reads the name.
@@ -94,8 +100,13 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
     let phase = table.value("phase");
     let contact = table.read("contact", |node, _| read_contact(node, context));
     // An entry may replace tick and compute-delay of `[peer]`, so that both are not known while `[peer]` is read alone.
-    let limits =
-        ExchangeLimits { tick: tick.filter(|_| !context.partial), compute_delay: compute_delay == Some(1) && !context.partial, turns: context.turns };
+    let limits = ExchangeLimits {
+        tick: tick.filter(|_| !context.partial),
+        compute_delay: compute_delay == Some(1) && !context.partial,
+        turns: context.turns,
+        // A service replies with the state before the force of the message takes effect: a reading is used an exchange later.
+        late: matches!(kind, Some(PeerKind::Inverse3(..))) && !context.partial,
+    };
     let device = table.maybe("device", |node, context| read_device(node, context, limits, A_DEVICE));
     // Device of a peer without a given device. A simulated peer needs a device, and so does another process in virtual time, where the peer is simulated.
     let absent = match &kind {
@@ -109,6 +120,12 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
                 table.require("device", UDP_DEVICE);
             }
             Some(STILL_DEVICE)
+        }
+        Some(PeerKind::Inverse3(..)) => {
+            if !context.live {
+                table.require("device", INVERSE3_DEVICE);
+            }
+            Some(FALCON_DEVICE)
         }
         Some(PeerKind::Falcon(..) | PeerKind::Pointer(..)) => Some(FALCON_DEVICE),
     };
@@ -152,7 +169,11 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
     }
     let (offset, drift) = clock?;
     let (device, coupling) = (device?, coupling?);
-    let (exchange, turned_device) = device.as_ref().map_or((Exchange::EACH_TICK, None), |device| (device.exchange, device.turned));
+    let (exchange, turned_device) = match &device {
+        Some(device) => (device.exchange, device.turned),
+        // A peer without a device in the file has the exchanges of its kind.
+        None => (check_exchange(Exchange { late: limits.late, ..Exchange::EACH_TICK }, node, *context, limits)?, None),
+    };
     let rotation = PeerRotationKeys { device: turned_device, coupling: coupling.and_then(|(_, _, turned)| turned), torque: torque?, ..turned? };
     Some(PeerKeys {
         kind: kind?,

@@ -6,7 +6,7 @@ use cohaptic_peer::rotation::{Attitude, Triple};
 
 use super::peers::PeerRead;
 use super::rotation::{ObjectRotation, PeerRotationKeys};
-use crate::{DeviceRotationSpec, PeerRotation, RotationSpec};
+use crate::{DeviceRotationSpec, PeerKind, PeerRotation, RotationSpec};
 
 /// Returns the rotation of the object with the rotational parts of the peers; `Some(None)` without an inertia. `object` has the keys of `[object]`, `gains`
 /// the keys of `[coordination]`.
@@ -32,8 +32,12 @@ fn peer_rotation(read: &PeerRead, attitude: Attitude, context: Context<'_>) -> O
     };
     let device = match device {
         Some(_) if read.spec.kind.is_in_hand() => {
-            let device = if matches!(read.spec.kind, crate::PeerKind::Falcon(..)) { "Falcon" } else { "pointer" };
-            return refuse(format!("peer \"{name}\": a {device} turns nothing: expected a device without an inertia"));
+            let device = match read.spec.kind {
+                PeerKind::Falcon(..) => "a Falcon",
+                PeerKind::Inverse3(..) => "an Inverse3",
+                PeerKind::Simulated | PeerKind::Udp(_) | PeerKind::Pointer(..) => "a pointer",
+            };
+            return refuse(format!("peer \"{name}\": {device} turns nothing: expected a device without an inertia"));
         }
         Some(handle) => {
             let touches = read.spec.contact == cohaptic_peer::Contact::Grasp;

@@ -186,7 +186,7 @@ fn unkept(scene: &Scene, text: &str, path: &Path) -> Option<String> {
     if let Some(name) = content.files.keys().next() {
         return Some(format!("the scene names the file {name}, and a study keeps nothing but the scene: expected a scene without other files"));
     }
-    let peer = scene.peers.iter().find(|peer| matches!(peer.kind, PeerKind::Udp(_) | PeerKind::Falcon(..)))?;
+    let peer = scene.peers.iter().find(|peer| matches!(peer.kind, PeerKind::Udp(_) | PeerKind::Falcon(..) | PeerKind::Inverse3(..)))?;
     Some(format!("peer {} is a {}: expected peers of kind pointer, for people, or simulated", quote(&peer.name), peer.kind.name()))
 }
 

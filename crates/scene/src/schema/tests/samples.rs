@@ -16,7 +16,7 @@ pub(super) const SCENES: [&str; 5] = [
     coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
     simulation = { integrator = "rk4" }
     topology = {}
-    peer = { kind = "falcon", falcon = {}, pointer = {}, silence = {}, coupling = { stiffness = 1 }, device = { mass = 1 } }
+    peer = { kind = "falcon", falcon = {}, inverse3 = { service = "ws://127.0.0.1:10001/", origin = [0, 0, 0], reading-age = "10ms" }, pointer = {}, silence = {}, coupling = { stiffness = 1 }, device = { mass = 1 } }
     peers = [
         { name = "a", hand = { sine = { amplitude = 1, frequency = 1 } }, clock = { offset = "1ms" }, contact = { push = "+x" } },
         { name = "b", hand = { arm = { mass = 0, damping = 1, stiffness = 1 }, follows = { sine = { amplitude = 1, frequency = 1 } } }, clock = { drift = "1ppm" } },

@@ -7,7 +7,7 @@ pub(super) struct Part {
 }
 
 /// Tables that several documents contain. A row of a document names such a table by its heading: `links[].@Counters`.
-pub(super) const PARTS: [Part; 8] = [
+pub(super) const PARTS: [Part; 10] = [
     Part {
         name: "Counters",
         rows: &[
@@ -66,6 +66,26 @@ pub(super) const PARTS: [Part; 8] = [
             ("limit_n, largest_n", "the limit, and the largest force"),
             ("limited, slewed, saturated", "how many forces were changed"),
             ("zeroed.NAME", "how many were zero, by cause"),
+        ],
+    },
+    Part {
+        name: "Exchanges with an Inverse3",
+        rows: &[
+            ("readings, readings_per_s", "replies with a reading"),
+            ("reply_p50_us, reply_p99_us, reply_max_us", "time from a message to its reply"),
+            ("late, exchange_every", "replies that took longer than the scene says; the ticks that 99 of 100 replies fit in"),
+            ("force_rms_n", "of the force asked for minus the device's force; `null` where the service does not say"),
+            ("dropped.NAME", "replies without a meaning, by cause"),
+            ("older, unasked, lost", "replies to messages before the latest, replies without a message, messages without a reply"),
+            ("connections, losses", "how often the service was connected, and an armed device disarmed"),
+            ("forces.largest_n, forces.limited, forces.slewed, forces.zeroed.NAME", "what became of the forces asked for"),
+        ],
+    },
+    Part {
+        name: "Inverse3",
+        rows: &[
+            ("simulated, device, service_version, hears_events", "which device, and whether events of the service arrive"),
+            ("error", "the obstacle, or `null`"),
         ],
     },
     Part {

@@ -1,13 +1,14 @@
-//! Documents of programs in real time: sessions, relay, router and Falcon.
+//! Documents of programs in real time: sessions, relay, router, Falcon and Inverse3.
 
 use super::Document;
 
-pub(super) const REAL_TIME: [Document; 7] = [
+pub(super) const REAL_TIME: [Document; 11] = [
     Document {
         command: "live",
         lines: &[
             "cohaptic live scenarios/live/two-and-a-program.toml --set measure.names=all --for 50ms --listen 127.0.0.1:0 --no-priority --json",
             "cohaptic live scenarios/live/three-falcons.toml --for 50ms --no-priority --json",
+            "cohaptic live scenarios/live/two-inverse3s.toml --for 50ms --no-priority --json",
             "cohaptic live scenarios/tasks/hold.toml --set task.fail.force=0.001 --for 50ms --no-priority --json",
         ],
         rows: &[
@@ -30,6 +31,7 @@ pub(super) const REAL_TIME: [Document; 7] = [
                 "of [devices](extending.md#a-device-of-your-own-in-rust) and pointers: ticks without force on the hand, by cause",
             ),
             ("peers[].gate.limited, peers[].gate.slewed", "ticks at which the force on the hand was shortened, and its change"),
+            ("peers[].exchanges.@Exchanges with an Inverse3", "of Inverse3s: what was exchanged with the service"),
             ("link_totals.NAME, link_quantiles.NAME, links[].from, links[].to, links[].@Counters, access_lines", "as of a run"),
             ("door.address, door.handled", "with other programs: where it listens; `handled` = `admitted` + `welcomed` + all of `refused`"),
             ("door.admitted, door.welcomed, door.refused.NAME", "datagrams; refused ones [by cause](live-protocol.md#why-a-datagram-is-refused)"),
@@ -136,6 +138,50 @@ pub(super) const REAL_TIME: [Document; 7] = [
                 "true_position_m, largest_position_error_m, motor_force_n, largest_motor_force_n",
                 "of the simulated device itself; the position from the base",
             ),
+        ],
+    },
+    Document {
+        command: "inverse3 probe",
+        lines: &["cohaptic inverse3 probe --simulated --for 300ms --json"],
+        rows: &[
+            ("@Inverse3", "which device"),
+            ("ending", "`complete`, `interrupted` or `failed`"),
+            ("phase, position_m, velocity_m_s, force_n", "seen last, from the origin; `null` where they mean nothing"),
+            ("exchanges.@Exchanges with an Inverse3", "what was exchanged"),
+        ],
+    },
+    Document {
+        command: "inverse3 watch",
+        lines: &["cohaptic inverse3 watch --simulated --for 300ms --json"],
+        rows: &[
+            ("@Inverse3", "which device"),
+            ("ending", "`complete`, `interrupted` or `failed`"),
+            ("active_after_s", "when forces first could go out"),
+            ("phase, position_m, velocity_m_s, force_n", "seen last, from the origin; `null` where they mean nothing"),
+            ("lowest_m, highest_m, fastest_m_s", "of the cursor"),
+            ("exchanges.@Exchanges with an Inverse3", "what was exchanged"),
+            ("files", "what was written"),
+        ],
+    },
+    Document {
+        command: "inverse3 simulate",
+        lines: &["cohaptic inverse3 simulate --for 1s --json"],
+        rows: &[
+            ("seed, asked_n, ending", "what was asked for, and how it ended"),
+            ("changes[].t_s, changes[].phase, more_changes", "the first hundred phases; how many more"),
+            ("phase, position_m, velocity_m_s, force_n", "seen last before the stop, from the origin"),
+            ("exchanges.@Exchanges with an Inverse3", "what was exchanged"),
+            ("device.messages, device.unreadable, device.forces, device.largest_force_n, device.idled", "what the service saw"),
+            ("true_position_m, motor_force_n, largest_motor_force_n", "of the device itself, after the stop and at most"),
+        ],
+    },
+    Document {
+        command: "inverse3 simulate --listen",
+        lines: &["cohaptic inverse3 simulate --listen 127.0.0.1:0 --for 100ms --json"],
+        rows: &[
+            ("address, ending", "where the device was served"),
+            ("device.messages, device.unreadable, device.forces, device.largest_force_n, device.idled", "what the service saw"),
+            ("true_position_m", "of the device at the end"),
         ],
     },
 ];
