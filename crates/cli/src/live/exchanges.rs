@@ -10,7 +10,7 @@ use crate::inverse3::Exchanges;
 
 /// Handles to facts about the devices of a session. The facts are whole once the session has dropped the devices.
 #[derive(Debug, Default)]
-pub(super) struct DeviceFacts {
+pub(crate) struct DeviceFacts {
     /// Index of the peer, and facts of the device.
     #[cfg(feature = "inverse3")]
     pub(super) inverse3s: Vec<(usize, cohaptic_live::inverse3s::Facts)>,
