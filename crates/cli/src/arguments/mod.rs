@@ -39,7 +39,7 @@ pub(crate) use join::{JoinArguments, JoinDevice};
 pub(crate) use links::{EcnKind, FitArguments, LinkArguments, Profile};
 pub(crate) use pages::{CompletionsArguments, FileKind, InitArguments, ManArguments, SchemaArguments};
 pub(crate) use paper::PaperArguments;
-pub(crate) use realtime::{LiveArguments, PaceArguments, PlayArguments, RealTimeArguments, RelayArguments, RouterArguments};
+pub(crate) use realtime::{ControlFilesArguments, LiveArguments, PaceArguments, PlayArguments, RealTimeArguments, RelayArguments, RouterArguments};
 pub(crate) use scenes::{CampaignArguments, CheckArguments, ExplainArguments, MeasureArguments, RunArguments, TableFormat};
 pub(crate) use shards::{ShardArguments, ShardName};
 pub(crate) use stability::{

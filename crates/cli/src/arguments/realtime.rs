@@ -38,12 +38,17 @@ pub(crate) struct RealTimeArguments {
     /// Take the token of live control from this file, which only its owner may read [default: a random token]
     #[arg(long, value_name = "FILE", requires = "control")]
     pub(crate) token_file: Option<PathBuf>,
-    /// Let live control name the files of this folder in keys of links [default: only files that a link names already]
-    #[arg(long, value_name = "DIR", requires = "control")]
-    pub(crate) control_files: Option<PathBuf>,
     /// Also listen on addresses that other machines can reach
     #[arg(long)]
     pub(crate) allow_remote: bool,
+}
+
+/// Files for live control of links. Sessions of a study have none, because the conditions of the study alone set links.
+#[derive(Debug, Args)]
+pub(crate) struct ControlFilesArguments {
+    /// Let live control name the files of this folder in keys of links [default: only files that a link names already]
+    #[arg(long, value_name = "DIR", requires = "control")]
+    pub(crate) control_files: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -59,6 +64,8 @@ pub(crate) struct LiveArguments {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) real_time: RealTimeArguments,
+    #[command(flatten)]
+    pub(crate) files: ControlFilesArguments,
     /// Length of the session, in place of the scene's duration
     #[arg(long = "for", value_name = "TIME", value_parser = parse::duration)]
     pub(crate) length: Option<Duration>,
@@ -89,6 +96,8 @@ pub(crate) struct PlayArguments {
     pub(crate) overrides: Overrides,
     #[command(flatten)]
     pub(crate) real_time: RealTimeArguments,
+    #[command(flatten)]
+    pub(crate) files: ControlFilesArguments,
     /// Do not open a browser
     #[arg(long)]
     pub(crate) no_open: bool,
@@ -125,6 +134,8 @@ pub(crate) struct RelayArguments {
     pub(crate) back: Option<Vec<OsString>>,
     #[command(flatten)]
     pub(crate) real_time: RealTimeArguments,
+    #[command(flatten)]
+    pub(crate) files: ControlFilesArguments,
     /// End by itself after this time [default: on Ctrl-C]
     #[arg(long = "for", value_name = "TIME", value_parser = parse::duration)]
     pub(crate) length: Option<Duration>,
@@ -162,6 +173,8 @@ pub(crate) struct RouterArguments {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) real_time: RealTimeArguments,
+    #[command(flatten)]
+    pub(crate) files: ControlFilesArguments,
     /// End by itself after this time [default: on Ctrl-C]
     #[arg(long = "for", value_name = "TIME", value_parser = parse::duration)]
     pub(crate) length: Option<Duration>,

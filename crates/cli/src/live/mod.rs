@@ -88,7 +88,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let (changes, wanted) = channel();
     let elapsed = Elapsed::default();
     let editor =
-        TimedLinks { links: KeyedLinks { keys, folder, files: ControlFiles::of(&arguments.real_time)?, changes }, planned, elapsed: elapsed.clone() };
+        TimedLinks { links: KeyedLinks { keys, folder, files: ControlFiles::of(&arguments.files)?, changes }, planned, elapsed: elapsed.clone() };
     let content = input::with(path, |text, file| scene_content_of_text(text, file, overrides))?;
     let timeline = edits(&content.keys);
     let _own = arguments.out.as_deref().map(own_folder).transpose()?;

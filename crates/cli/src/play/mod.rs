@@ -51,7 +51,7 @@ pub(crate) fn play(arguments: &PlayArguments) -> Result<ExitCode, Failure> {
     check(&beginning)?;
     let (beginning, lent) = lend_hand(beginning)?;
     let records = Records::create(arguments.out.as_deref())?;
-    let stage = Arc::new(PlayStage::new(beginning.clone(), arguments.scene.is_none(), ControlFiles::of(&arguments.real_time)?));
+    let stage = Arc::new(PlayStage::new(beginning.clone(), arguments.scene.is_none(), ControlFiles::of(&arguments.files)?));
     let scene = beginning.scene()?;
     let board = Arc::new(Board::new(onlookers::description(&scene, &onlookers::pairs(&scene))));
     let address = arguments.real_time.control.unwrap_or_else(|| SocketAddr::from(([127, 0, 0, 1], 0)));

@@ -11,7 +11,7 @@ use cohaptic_linkfile::reading::FileReader;
 use cohaptic_scene::LinkKeys;
 use rustix::fs::{Mode, OFlags};
 
-use crate::arguments::RealTimeArguments;
+use crate::arguments::ControlFilesArguments;
 use crate::failure::Failure;
 
 /// Files that a person at a page of live control may name in keys of links.
@@ -26,7 +26,7 @@ pub(crate) struct ControlFiles {
 
 impl ControlFiles {
     /// Resolves the folder that the command line allows. Without `--control-files`, no folder is allowed.
-    pub(crate) fn of(arguments: &RealTimeArguments) -> Result<Self, Failure> {
+    pub(crate) fn of(arguments: &ControlFilesArguments) -> Result<Self, Failure> {
         let Some(path) = &arguments.control_files else { return Ok(Self::default()) };
         let refused = |error: io::Error| Failure::Input(format!("--control-files {}: {error}: expected a folder", path.display()));
         let folder = path.canonicalize().map_err(refused)?;

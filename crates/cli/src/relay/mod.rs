@@ -31,7 +31,7 @@ pub(crate) fn relay(arguments: &RelayArguments) -> Result<ExitCode, Failure> {
     let mut relay = Relay::bind(setup.config.clone(), EndpointConfig::default()).map_err(failure)?;
     setup.opened(relay.ports()).iter().for_each(|line| say(line));
     let (changes, wanted) = channel();
-    let files = ControlFiles::of(&arguments.real_time)?;
+    let files = ControlFiles::of(&arguments.files)?;
     let editor = KeyedLinks { keys: std::mem::take(&mut setup.keys), folder: setup.folder.clone(), files, changes };
     let control = LiveControl::open(&arguments.real_time, description(&setup), Box::new(editor))?;
     let options = RunOptions {

@@ -33,7 +33,7 @@ pub(crate) fn router(arguments: &RouterArguments) -> Result<ExitCode, Failure> {
     // Each direction of a link has keys of its own, because live control can change one direction alone. Lanes 2 n and 2 n + 1 are the directions of link n.
     let keys = file.links.iter().flat_map(|link| [link.keys.clone(), link.keys.clone()]).collect();
     let folder = arguments.file.parent().map(Path::to_path_buf).unwrap_or_default();
-    let editor = KeyedLinks { keys, folder, files: ControlFiles::of(real_time)?, changes };
+    let editor = KeyedLinks { keys, folder, files: ControlFiles::of(&arguments.files)?, changes };
     let control = LiveControl::open(real_time, description(&file), Box::new(editor))?;
     let ran = conduct(&mut router, &file, arguments, until, &control, wanted)?;
     if arguments.json {

@@ -22,9 +22,6 @@ const MOST_DIFFERENCES: usize = 50;
 pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitCode, Failure> {
     match &arguments.command {
         StudyCommand::Run(arguments) if arguments.dry_run => dry_run(arguments),
-        StudyCommand::Run(arguments) if arguments.real_time.control_files.is_some() => {
-            Err(Failure::Input("--control-files has no use here: the conditions of a study alone set its links. Leave the option out".to_owned()))
-        }
         StudyCommand::Run(arguments) => with_people(arguments),
         StudyCommand::Report(arguments) => report(arguments),
         StudyCommand::Verify(arguments) => verify(arguments),
