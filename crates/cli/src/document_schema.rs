@@ -45,6 +45,9 @@ impl DocumentSchema {
     pub(crate) const LINK: Self = Self { name: "cohaptic/link", version: 1 };
     pub(crate) const PROFILES: Self = Self { name: "cohaptic/profiles", version: 1 };
     pub(crate) const FIT: Self = Self { name: "cohaptic/fit", version: 1 };
+    pub(crate) const STUDY_DRY_RUN: Self = Self { name: "cohaptic/study-dry-run", version: 1 };
+    pub(crate) const STUDY_REPORT: Self = Self { name: "cohaptic/study-report", version: 1 };
+    pub(crate) const STUDY_VERIFY: Self = Self { name: "cohaptic/study-verify", version: 1 };
     pub(crate) const PAPER: Self = Self { name: "cohaptic/paper", version: 1 };
     pub(crate) const ERROR: Self = Self { name: "cohaptic/error", version: 1 };
 

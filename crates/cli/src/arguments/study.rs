@@ -39,6 +39,9 @@ pub(crate) struct StudyRunArguments {
     /// Number of dry runs, each with other persons. The output tells how often each difference is found
     #[arg(long, value_name = "N", default_value_t = 1, requires = "dry_run", allow_negative_numbers = true, value_parser = integer::<u64>(1, 99_999))]
     pub(crate) times: u64,
+    /// Print one JSON document and nothing else, about a dry run
+    #[arg(long, requires = "dry_run")]
+    pub(crate) json: bool,
     /// Folder of the study: trials, answers, tables and report.html. Repeat the command to go on from there
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
@@ -55,6 +58,9 @@ pub(crate) struct StudyFolderArguments {
     /// Folder of the study
     #[arg(value_name = "DIR")]
     pub(crate) folder: PathBuf,
+    /// Print one JSON document and nothing else
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -1,16 +1,18 @@
 //! `cohaptic study`: sessions with people, dry runs, reports, verification, and persons who are forgotten.
 
+mod answer;
 #[cfg(target_os = "linux")]
 mod serve;
 
 use std::path::Path;
 use std::process::ExitCode;
 
-use cohaptic_study::{Power, Study, StudyError, StudyFolder, Watch, power_lines};
+use cohaptic_study::{Analysis, Power, Study, StudyError, StudyFolder, Verified, Watch, power_lines};
 use cohaptic_units::print::Counted;
 
 use crate::arguments::{StudyArguments, StudyCommand, StudyFolderArguments, StudyForgetArguments, StudyRunArguments};
 use crate::campaign::{PROGRAM, pool};
+use crate::document_schema::DocumentSchema;
 use crate::failure::{EXPECTATION, Failure};
 use crate::progress::Progress;
 use crate::{interrupt, output};
@@ -59,22 +61,32 @@ fn dry_run(arguments: &StudyRunArguments) -> Result<ExitCode, Failure> {
     })?;
     shown.0.clear();
     let power = done.map_err(failure)?.ok_or_else(go_on)?;
-    output::text(&words(&folder, &power)?)?;
-    output::wrote(TABLES.map(|name| arguments.out.join(name)));
+    let analysis = folder.analysis().map_err(failure)?;
+    let files = tables(&arguments.out);
+    output::answer(
+        arguments.json,
+        DocumentSchema::STUDY_DRY_RUN,
+        &answer::dry_run(folder.study(), &analysis, &power, &files),
+        || words(folder.study(), &analysis, &power),
+        &files,
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// Names of the written files.
 const TABLES: [&str; 5] = ["trials.csv", "trials.parquet", "answers.csv", "answers.parquet", "report.html"];
 
+/// Returns the paths of the written files.
+fn tables(folder: &Path) -> Vec<String> {
+    TABLES.iter().map(|name| output::path(&folder.join(name))).collect()
+}
+
 /// Returns the answer of a dry run in words.
-fn words(folder: &StudyFolder, power: &Power) -> Result<String, Failure> {
-    let study = folder.study();
-    let analysis = folder.analysis().map_err(failure)?;
+fn words(study: &Study, analysis: &Analysis, power: &Power) -> String {
     let mut text = format!(
         "{}: {} in {}, {} each, played by modelled persons\n",
         study.title,
-        Counted(study.participants(), "person").to_string().replace("persons", "people"),
+        Counted(study.participants(), "person"),
         Counted(study.groups, "group"),
         Counted(study.conditions.len(), "condition"),
     );
@@ -84,26 +96,37 @@ fn words(folder: &StudyFolder, power: &Power) -> Result<String, Failure> {
     let lines = |lines: Vec<String>| lines.into_iter().map(|line| format!("  {line}\n")).collect::<String>();
     text.push_str(&format!("\nMeans and timeouts of the first dry run:\n{}", lines(analysis.mean_lines(study))));
     text.push_str(&format!("\nHow often the differences are found, in {}:\n{}", Counted(power.times, "dry run"), lines(power_lines(study, power))));
-    Ok(text)
+    text
 }
 
 /// Writes the tables and the report again.
 fn report(arguments: &StudyFolderArguments) -> Result<ExitCode, Failure> {
     let folder = open(&arguments.folder)?;
     folder.write_tables().map_err(failure)?;
-    let sessions = Counted(folder.study().groups, "session");
-    output::text(&format!("{} of {sessions} are complete\n", folder.complete()))?;
-    output::wrote(TABLES.map(|name| arguments.folder.join(name)));
+    let (study, complete, files) = (folder.study(), folder.complete(), tables(&arguments.folder));
+    let analysis = folder.analysis().map_err(failure)?;
+    output::answer(
+        arguments.json,
+        DocumentSchema::STUDY_REPORT,
+        &answer::report(study, &analysis, complete, &files),
+        || format!("{complete} of {} are complete\n", Counted(study.groups, "session")),
+        &files,
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// Replays every trial. Differences give the status of a failed expectation.
 fn verify(arguments: &StudyFolderArguments) -> Result<ExitCode, Failure> {
     let verified = open(&arguments.folder)?.verify().map_err(failure)?;
+    let words = || verified_words(&verified);
+    output::answer(arguments.json, DocumentSchema::STUDY_VERIFY, &answer::verify(&verified), words, output::NO_FILES)?;
+    Ok(if verified.differences.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(EXPECTATION) })
+}
+
+fn verified_words(verified: &Verified) -> String {
     let trials = Counted(verified.trials, "trial");
     if verified.differences.is_empty() {
-        output::text(&format!("{trials} replayed: every measure, every scene and every table is as it is kept\n"))?;
-        return Ok(ExitCode::SUCCESS);
+        return format!("{trials} replayed: every measure, every scene and every table is as it is kept\n");
     }
     let mut text = format!("{trials} replayed, with {}:\n", Counted(verified.differences.len(), "difference"));
     for difference in verified.differences.iter().take(MOST_DIFFERENCES) {
@@ -113,8 +136,7 @@ fn verify(arguments: &StudyFolderArguments) -> Result<ExitCode, Failure> {
     if more > 0 {
         text.push_str(&format!("  and {more} more\n"));
     }
-    output::text(&text)?;
-    Ok(ExitCode::from(EXPECTATION))
+    text
 }
 
 /// Removes the answers of a person and all trials of the person's group.

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-use crate::integration::desk::Desk;
+use crate::integration::desk::{Desk, parse};
 
 /// A desk with the shipped study, of four groups, two conditions and three trials each.
 fn desk() -> Desk {
@@ -80,11 +80,15 @@ fn a_study_is_verified_and_a_person_is_forgotten() {
     for name in ["study.toml", "pull.toml", "consent.md", "task.md"] {
         fs::remove_file(desk.path(name)).unwrap();
     }
+    assert_eq!(desk.json("study verify out --json")["differences"], serde_json::json!([]));
     assert_eq!(desk.text("study verify out"), "24 trials replayed: every measure, every scene and every table is as it is kept\n");
     desk.write("out/trials.csv", desk.read("out/trials.csv").replacen("done", "undone", 1));
     let changed = desk.cohaptic("study verify out");
     assert_eq!(changed.status, Some(1));
     assert!(changed.stdout.starts_with("24 trials replayed, with 1 difference:\n  trials.csv: line 2: "), "{}", changed.stdout);
+    let changed = desk.cohaptic("study verify out --json");
+    let document = parse(&changed.stdout);
+    assert_eq!((changed.status, &document["trials"], document["differences"].as_array().unwrap().len()), (Some(1), &24.into(), 1));
     assert_eq!(desk.text("study report out"), "4 of 4 sessions are complete\n");
     assert!(desk.text("study forget P03 out").starts_with("P03 is forgotten"));
     for name in ["trials.csv", "answers.csv", "report.html"] {
@@ -95,6 +99,25 @@ fn a_study_is_verified_and_a_person_is_forgotten() {
     desk.cohaptic("study forget P33 out").assert_refused(2, &["nobody in the study in out has the code P33"]);
     desk.cohaptic("study forget anna out").assert_refused(2, &["\"anna\" is no code of a person", "such as P07"]);
     desk.cohaptic("study verify nowhere").assert_refused(2, &["nowhere holds no study", "--out"]);
+}
+
+/// The documents have the figures of the words and of the tables.
+#[test]
+fn a_dry_run_and_a_report_are_documents_with_the_same_figures() {
+    let desk = desk();
+    let line = "study study.toml --dry-run --times 3 --out out";
+    let dry = desk.json(&format!("{line} --json"));
+    let words = desk.text(line);
+    assert_eq!((&dry["schema"], &dry["people"], &dry["groups"], &dry["times"]), (&"cohaptic/study-dry-run".into(), &8.into(), &4.into(), &3.into()));
+    assert!(dry["warnings"].as_array().unwrap().iter().all(|warning| words.contains(warning.as_str().unwrap())), "{dry:#}");
+    let power = dry["power"].as_array().unwrap();
+    assert!(!power.is_empty() && power.iter().all(|row| row["found"]["of"] == 3), "{dry:#}");
+    let first = &dry["measures"][0];
+    assert_eq!((first["means"].as_array().unwrap().len(), first["differences"].as_array().unwrap().len()), (2, 1));
+    let report = desk.json("study report out --json");
+    assert_eq!((&report["measures"], &report["conditions"], &report["files"]), (&dry["measures"], &dry["conditions"], &dry["files"]));
+    assert_eq!(report["sessions_complete"], 4);
+    desk.cohaptic("study study.toml --out other --json").assert_refused(2, &["--dry-run"]);
 }
 
 #[test]

@@ -7,7 +7,7 @@ pub(super) struct Part {
 }
 
 /// Tables that several documents contain. A row of a document names such a table by its heading: `links[].@Counters`.
-pub(super) const PARTS: [Part; 10] = [
+pub(super) const PARTS: [Part; 11] = [
     Part {
         name: "Counters",
         rows: &[
@@ -86,6 +86,16 @@ pub(super) const PARTS: [Part; 10] = [
         rows: &[
             ("simulated, device, service_version, hears_events", "which device, and whether events of the service arrive"),
             ("error", "the obstacle, or `null`"),
+        ],
+    },
+    Part {
+        name: "Figures of a study",
+        rows: &[
+            ("name, groups, groups_left_out", "of a measure or a question; groups with a value in every condition, and the others"),
+            ("means[].mean, means[].half_width", "of each condition, with half of the interval of 95 % (`null` for one group)"),
+            ("means[].timed_out, means[].trials", "trials that count as the timeout, of all with a value; `null` for a question"),
+            ("differences[].mean, differences[].half_width, differences[].effect", "of each condition but the first to the first; effect size d_z"),
+            ("differences[].p, differences[].p_holm", "of the sign flip test, before and after the correction of Holm"),
         ],
     },
     Part {

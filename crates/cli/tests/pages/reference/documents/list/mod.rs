@@ -20,7 +20,41 @@ pub(super) const NAMESPACES: &str = "unshare --map-root-user --net --mount true 
 pub(super) const DOCUMENTS: [&[Document]; 5] = [&scenes::SCENES, &analyses::ANALYSES, &real_time::REAL_TIME, &links::LINKS, &OTHERS];
 
 /// Documents of other commands, and of errors of every command.
-const OTHERS: [Document; 2] = [
+const OTHERS: [Document; 5] = [
+    Document {
+        command: "study run",
+        lines: &["cohaptic study studies/pull/study.toml --dry-run --out dry --json"],
+        rows: &[
+            ("title, people, groups", "of the study; how many people in how many groups"),
+            ("conditions, warnings", "labels of the conditions; what a reader must know before any number"),
+            ("measures[].@Figures of a study", "of the first dry run"),
+            ("times", "number of dry runs"),
+            ("power[].measure, power[].condition, power[].mean", "each difference to the first condition; its mean over the dry runs"),
+            (
+                "power[].found.count, power[].found.of, power[].found.low, power[].found.high",
+                "dry runs with p < 0.05, of how many, and the ends of the interval of the share",
+            ),
+            (
+                "power[].found_after_holm.count, power[].found_after_holm.of, power[].found_after_holm.low, power[].found_after_holm.high",
+                "the same after the correction of Holm",
+            ),
+            ("files", "what was written"),
+        ],
+    },
+    Document {
+        command: "study report",
+        lines: &["cohaptic study studies/pull/study.toml --dry-run --out dry > /dev/null && cohaptic study report dry --json"],
+        rows: &[
+            ("title, people, groups, conditions, warnings, files", "as of a dry run"),
+            ("sessions_complete", "number of complete sessions"),
+            ("measures[].@Figures of a study", "of the complete sessions"),
+        ],
+    },
+    Document {
+        command: "study verify",
+        lines: &["cohaptic study studies/pull/study.toml --dry-run --out dry > /dev/null && cohaptic study verify dry --json"],
+        rows: &[("trials, differences", "replayed trials; each difference to what is kept, in words")],
+    },
     Document {
         command: "paper",
         lines: &["cohaptic paper --quick --json"],
