@@ -1,6 +1,6 @@
 //! Logical time driven by the wall clock.
 //!
-//! Use this crate if a state machine of yours must act on time by the wall clock. The crate needs Linux.
+//! Use this crate if a state machine of yours must act on time by the wall clock. Clock, loop and sockets need Linux; [`Lateness`] and [`Recent`] do not.
 //!
 //! The state machines of this project do not read a clock; a caller tells them the time. In virtual time the caller is a loop. In real time a [`Clock`] gives
 //! the time, a [`Pacer`] waits for the next deadline, and [`drive`] is the whole loop: it reads sockets, tells the time, sends and waits. A state machine is
@@ -36,18 +36,26 @@
 //! # Ok::<(), std::io::Error>(())
 //! ```
 
-#[cfg(not(target_os = "linux"))]
-compile_error!("cohaptic-realtime needs Linux: its timers, its sockets and the scheduling of its threads are those of Linux");
-
+#[cfg(target_os = "linux")]
 mod clock;
+#[cfg(target_os = "linux")]
 mod drive;
 mod lateness;
+#[cfg(target_os = "linux")]
 mod pacer;
+mod recent;
+#[cfg(target_os = "linux")]
 mod thread;
+#[cfg(target_os = "linux")]
 pub mod udp;
 
+#[cfg(target_os = "linux")]
 pub use clock::{Clock, KernelStamps, MonotonicClock};
+#[cfg(target_os = "linux")]
 pub use drive::{Driven, Received, Schedule, drive};
 pub use lateness::{Lateness, LatenessSummary, Tolerance, Validity};
+#[cfg(target_os = "linux")]
 pub use pacer::{Pacer, Pacing, Woken};
+pub use recent::Recent;
+#[cfg(target_os = "linux")]
 pub use thread::{Prepared, Refused, Wish, Wishes, prepare_thread};

@@ -5,15 +5,14 @@ mod clients;
 mod datagram;
 mod pool;
 mod programs;
-mod recent;
 
 use core::time::Duration;
 use std::collections::VecDeque;
 use std::net::SocketAddr;
 use std::sync::Arc;
 
-use cohaptic_realtime::Lateness;
 use cohaptic_realtime::udp::Ecn;
+use cohaptic_realtime::{Lateness, Recent};
 use cohaptic_units::{self as units, Bytes, Instant};
 use cohaptic_wan::{Fate, LinkModel, LinkStats, Network, NetworkConfig, NetworkError, NodeId, PacketEvent, PacketInfo, PacketRecord, Path};
 
@@ -22,7 +21,6 @@ use clients::Clients;
 pub use datagram::{Arrival, Intake, IntakeCounts, LinkCounts, Port, Release};
 use pool::{Packet, Pool};
 use programs::Programs;
-use recent::Recent;
 
 /// State machine of a relay: datagrams go in with [`Engine::handle_datagram`] and come out with [`Engine::poll_release`].
 ///

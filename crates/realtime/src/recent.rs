@@ -1,10 +1,10 @@
-//! Delays of the latest datagrams of a link, for displays of a running relay.
+//! Delays of the latest packets of a link, for displays of a running program.
 
 use core::time::Duration;
 
-/// Ring of the delays of the latest datagrams delivered by a link. Allocates nothing before the first datagram.
+/// Ring of the delays of the latest 128 packets delivered by a link. Allocates nothing before the first packet.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Recent {
+pub struct Recent {
     /// At most [`Recent::MOST`] delays.
     delays: Vec<Duration>,
     /// Index of the next delay. Once the ring is full, the oldest delay is at this index.
@@ -15,7 +15,8 @@ impl Recent {
     /// Capacity of the ring.
     const MOST: usize = 128;
 
-    pub(super) fn record(&mut self, delay: Duration) {
+    /// Records the delay of a packet in place of the oldest delay.
+    pub fn record(&mut self, delay: Duration) {
         // While the ring grows, `next` is its length, and the lookup finds nothing.
         if let Some(oldest) = self.delays.get_mut(self.next) {
             *oldest = delay;
@@ -26,7 +27,8 @@ impl Recent {
     }
 
     /// Returns the delays in no particular order.
-    pub(super) fn delays(&self) -> &[Duration] {
+    #[must_use]
+    pub fn delays(&self) -> &[Duration] {
         &self.delays
     }
 }
