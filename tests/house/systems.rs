@@ -26,10 +26,11 @@ const PORTABLE: [&str; 18] = [
     "picture",
     "testkit",
     "paper",
+    "streams",
 ];
 
 /// Packages of this project that need Linux, and that the program takes there.
-const LINUX: [&str; 5] = ["realtime", "relay", "router", "exec", "live"];
+const LINUX: [&str; 4] = ["relay", "router", "exec", "live"];
 
 /// Speed against error, which has a program of its own and needs Linux too.
 const ACCURACY: &str = "accuracy";

@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 pub(crate) use cohaptic_answers::document;
-#[cfg(target_os = "linux")]
 use cohaptic_realtime::LatenessSummary;
 use serde::Serialize;
 
@@ -33,6 +32,7 @@ impl DocumentSchema {
     pub(crate) const ADMITTANCE: Self = Self { name: "cohaptic/admittance", version: 1 };
     pub(crate) const LIVE: Self = Self { name: "cohaptic/live", version: 1 };
     pub(crate) const RELAY: Self = Self { name: "cohaptic/relay", version: 1 };
+    pub(crate) const RELAY_TCP: Self = Self { name: "cohaptic/relay-tcp", version: 1 };
     pub(crate) const ROUTER: Self = Self { name: "cohaptic/router", version: 1 };
     pub(crate) const FALCON_PROBE: Self = Self { name: "cohaptic/falcon-probe", version: 1 };
     pub(crate) const FALCON_HOME: Self = Self { name: "cohaptic/falcon-home", version: 1 };
@@ -67,7 +67,6 @@ pub(crate) struct Versioned<'a, D: Serialize> {
 }
 
 /// Returns the quantiles of a lateness \[µs\].
-#[cfg(target_os = "linux")]
 pub(crate) fn lateness(summary: &LatenessSummary) -> impl Serialize + use<> {
     let LatenessSummary { count, p50, p99, p999, max, sum: _ } = *summary;
     document! { count: count, p50: micros(p50), p99: micros(p99), p999: micros(p999), max: micros(max) }

@@ -23,7 +23,8 @@ macro_rules! stand_in {
 
 #[cfg(not(target_os = "linux"))]
 fn without_linux(command: &str) -> Failure {
-    Failure::System(format!("cohaptic {command} needs Linux: its clocks, sockets or devices are those of Linux"))
+    let else_here = if command == "relay" { ". Between programs that speak TCP, relay --tcp runs here" } else { "" };
+    Failure::System(format!("cohaptic {command} needs Linux: its clocks, sockets or devices are those of Linux{else_here}"))
 }
 
 #[cfg(not(target_os = "linux"))]

@@ -44,7 +44,6 @@ mod paper;
 #[cfg(target_os = "linux")]
 mod play;
 mod progress;
-#[cfg(target_os = "linux")]
 mod realtime;
 #[cfg(target_os = "linux")]
 mod relay;
@@ -55,6 +54,7 @@ mod run;
 mod shard;
 mod shell;
 mod stability;
+mod streams;
 mod study;
 mod texts;
 mod variants;
@@ -110,6 +110,7 @@ fn main() -> ExitCode {
         Command::Join(arguments) => join::join(&arguments),
         Command::Play(arguments) => play::play(&arguments),
         Command::Study(arguments) => study::study(&arguments),
+        Command::Relay(arguments) if arguments.tcp => streams::relay(&arguments),
         Command::Relay(arguments) => relay::relay(&arguments),
         Command::Router(arguments) => router::router(&arguments),
         Command::Exec(arguments) => return exec::exec(&arguments),

@@ -18,6 +18,7 @@ pub(crate) fn schema(arguments: &SchemaArguments) -> Result<ExitCode, Failure> {
     let schema = match arguments.kind {
         FileKind::Scene => FileSchema::Scene.json(),
         FileKind::Relay => FileSchema::Relay.json(),
+        FileKind::RelayTcp => FileSchema::RelayTcp.json(),
         FileKind::Router => FileSchema::Router.json(),
         FileKind::Exec => FileSchema::Exec.json(),
         FileKind::Study => json_schema(&cohaptic_study::ROOT, "cohaptic study file"),

@@ -3,7 +3,8 @@
 //! Use this crate if your program reads links from files, or from words such as `delay=24ms`.
 //!
 //! A link is a table of keys, such as `{ delay = "24ms", loss = "1%" }`. This crate reads the keys of a link, the links between named ends, the file of a
-//! relay ([`RelayFile`]), the file of a router ([`router::RouterFile`]) and the file of hosts with commands ([`ExecFile`]). Every refusal is a [`FileError`] that names file, line, column and key, shows
+//! relay of UDP ([`RelayFile`]) or of TCP ([`TcpRelayFile`]), the file of a router ([`router::RouterFile`]) and the file of hosts with commands
+//! ([`ExecFile`]). Every refusal is a [`FileError`] that names file, line, column and key, shows
 //! the line, and says what was expected.
 //!
 //! This crate knows nothing of haptics. `cohaptic-scene` reads the other parts of a scene with the same [`reading::TableReader`] from the same
@@ -37,6 +38,7 @@ pub mod reading;
 mod relay;
 pub mod router;
 pub mod schema;
+pub mod stream;
 
 pub use address::{AddressError, address};
 pub use document::error::{Diagnostic, FileError};
@@ -47,3 +49,4 @@ pub use mesh::link_table::{LinkChange, LinkTable};
 pub use mesh::selector::LinkSelector;
 pub use quantity_text::{number_and_unit, text_of_quantity};
 pub use relay::{RelayChange, RelayFile, RelayLimits, RelayProgram, relay_link_keys_of_text};
+pub use relay::{TcpProxy, TcpRelayFile, TcpStream};

@@ -42,7 +42,7 @@ pub(super) fn after_measurements(examples: &[&str]) -> String {
 
 /// Returns the examples of the program, the meanings of the exit status, and on systems other than Linux the commands that need Linux.
 pub(super) fn of_program() -> String {
-    let needs = if cfg!(target_os = "linux") { "" } else { "\n\nThese commands need Linux: exec, falcon, inverse3, join, live, play, relay, router." };
+    let needs = if cfg!(target_os = "linux") { "" } else { "\n\nThese commands need Linux: exec, falcon, inverse3, join, live, play, relay without --tcp, router." };
     after(PROGRAM) + needs
 }
 
@@ -136,6 +136,7 @@ pub(super) const RELAY: &[&str] = &[
     "cohaptic relay --listen 127.0.0.1:7000 --to 127.0.0.1:9000 delay 24ms 2ms loss 1%",
     "cohaptic relay --listen 127.0.0.1:7000 --to 127.0.0.1:9000 delay=24ms --back delay=40ms loss=1%",
     "cohaptic relay relay.toml --set link.delay=8ms --set programs.left.port=127.0.0.1:7101 --for 1min",
+    "cohaptic relay --tcp --listen 127.0.0.1:7000 --to 127.0.0.1:9000 delay 24ms rate 10mbit reset-after 5s for 10%",
 ];
 
 pub(super) const ROUTER: &[&str] =

@@ -84,7 +84,7 @@ pub(crate) enum Command {
     Play(PlayArguments),
     /// Runs a study with people in groups, or with modelled persons: balanced orders, questions, tables, a report, and the power of the design
     Study(StudyArguments),
-    /// Puts the emulator between programs that speak UDP to each other
+    /// Puts the emulator between programs that speak UDP to each other, or TCP with --tcp
     Relay(RelayArguments),
     /// Puts the emulator between two network devices: any IP traffic
     Router(RouterArguments),

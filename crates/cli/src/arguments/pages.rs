@@ -43,6 +43,8 @@ pub(crate) enum FileKind {
     Scene,
     /// Relay files: for relay
     Relay,
+    /// Relay files for TCP: for relay --tcp
+    RelayTcp,
     /// Router files: for router
     Router,
     /// Files of hosts with commands: for exec

@@ -113,9 +113,13 @@ pub(crate) struct PlayArguments {
 #[command(after_help = after(examples::RELAY), override_usage = USAGE)]
 pub(crate) struct RelayArguments {
     /// A relay file: the programs, and the links between them; - reads it from standard input. With --listen the link, as for cohaptic link: words of
-    /// tc-netem (delay 20ms 5ms 25% loss 1%), or keys (delay=24ms loss=1%)
+    /// tc-netem (delay 20ms 5ms 25% loss 1%), or keys (delay=24ms loss=1%). With --tcp: delay, jitter and rate, and faults (stall 2s, close-after 5s,
+    /// reset-after 1s, cut-after 10kB, slice 100B 10ms, slow-close 1s; each may end with for 10%, a share of the connections) and buffer 64kB
     #[arg(required_unless_present = "listen", value_name = "FILE | SPEC", allow_negative_numbers = true)]
     pub(crate) words: Vec<OsString>,
+    /// Relay connections of TCP in place of datagrams, on every system. The relay sees bytes and no packets: loss needs cohaptic exec or router
+    #[arg(long, conflicts_with_all = ["packets", "spin", "no_priority", "control_files"])]
+    pub(crate) tcp: bool,
     /// Override a key of the relay file by its dotted path, repeatable: --set relay.forget-after=10s --set link.delay=8ms
     /// --set links.left.right.loss=5% --set programs.left.port=127.0.0.1:7101
     #[arg(long, value_name = "KEY=VALUE")]
@@ -123,7 +127,7 @@ pub(crate) struct RelayArguments {
     /// Print one JSON document and nothing else
     #[arg(long)]
     pub(crate) json: bool,
-    /// Address to which clients send datagrams for --to; port 0 takes any free port
+    /// Address to which clients send datagrams for --to, or connect; port 0 takes any free port
     #[arg(long, value_name = "ADDRESS", value_parser = looked_up, requires = "to", conflicts_with = "set")]
     pub(crate) listen: Option<SocketAddr>,
     /// Address of the program that clients speak to
@@ -145,7 +149,7 @@ pub(crate) struct RelayArguments {
     /// Largest number of datagrams in flight at once; more are dropped [default: that of the file, or 262144]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u64>(1, 1 << 24))]
     pub(crate) packets: Option<u64>,
-    /// Largest number of bytes in flight at once; more are dropped [default: that of the file, or 64MB]
+    /// Largest number of bytes in flight at once; more are dropped, or wait with --tcp [default: that of the file, or 64MB]
     #[arg(long, value_name = "SIZE", value_parser = room)]
     pub(crate) bytes: Option<Bytes>,
 }

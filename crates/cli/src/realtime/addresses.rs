@@ -2,6 +2,8 @@
 
 use std::net::{IpAddr, SocketAddr, UdpSocket};
 
+use crate::failure::Failure;
+
 /// Returns this machine's address for other machines, for a socket on all addresses such as 0.0.0.0. `None` if the socket listens on a single address, and if
 /// the machine has no network.
 pub(crate) fn own_address(listening: SocketAddr) -> Option<SocketAddr> {
@@ -27,6 +29,17 @@ pub(crate) fn reached_from_elsewhere(listening: SocketAddr, url: String) -> Stri
         Some(own) => url.replacen(&format!("{loopback}:{}", listening.port()), &own.to_string(), 1),
         None => url,
     }
+}
+
+/// Refuses an address outside this machine's loopback interface.
+pub(crate) fn local(option: &str, address: SocketAddr) -> Result<(), Failure> {
+    if address.ip().is_loopback() {
+        return Ok(());
+    }
+    Err(Failure::Input(format!(
+        "{option} {address} is not on loopback: expected an address such as 127.0.0.1 or ::1, or --allow-remote as well. The relay authenticates nobody: \
+         anybody who reaches its ports can speak through it"
+    )))
 }
 
 #[cfg(test)]

@@ -3,19 +3,27 @@
 
 use std::fs::File;
 use std::io::{self, IsTerminal as _, Read as _};
+#[cfg(target_os = "linux")]
 use std::path::PathBuf;
 use std::sync::Arc;
+#[cfg(target_os = "linux")]
 use std::sync::mpsc::Sender;
 use std::time::Duration;
 
 use cohaptic_control::{Board, Description, LinkCounters, LinkEditor, Quantiles, ServeError, Server, ServerConfig, Snapshot, Token, serve};
 use cohaptic_files::{LimitedFile, MOST_BYTES, open_to_others};
+#[cfg(target_os = "linux")]
 use cohaptic_linkfile::reading::FileReader;
 use cohaptic_realtime::LatenessSummary;
+#[cfg(target_os = "linux")]
 use cohaptic_scene::LinkKeys;
-use cohaptic_wan::{DropCause, LinkModel, LinkStats};
+#[cfg(target_os = "linux")]
+use cohaptic_wan::LinkModel;
+use cohaptic_wan::{DropCause, LinkStats};
 
-use super::{ControlFiles, reached_from_elsewhere, say};
+#[cfg(target_os = "linux")]
+use super::ControlFiles;
+use super::{reached_from_elsewhere, say};
 use crate::arguments::RealTimeArguments;
 use crate::failure::Failure;
 use crate::file;
@@ -98,6 +106,7 @@ impl Look {
 }
 
 /// Change of one link, checked and ready to be applied.
+#[cfg(target_os = "linux")]
 #[derive(Debug)]
 pub(crate) struct Edit {
     /// Index of the link in the description of the run.
@@ -107,6 +116,7 @@ pub(crate) struct Edit {
 }
 
 /// Editor of the links of a run. Checks each change of keys and sends valid changes to the run.
+#[cfg(target_os = "linux")]
 #[derive(Debug)]
 pub(crate) struct KeyedLinks {
     pub(crate) keys: Vec<LinkKeys>,
@@ -117,6 +127,7 @@ pub(crate) struct KeyedLinks {
     pub(crate) changes: Sender<Edit>,
 }
 
+#[cfg(target_os = "linux")]
 impl LinkEditor for KeyedLinks {
     fn keys(&self, link: usize) -> Vec<(String, String)> {
         self.keys.get(link).map_or_else(Vec::new, |keys| keys.iter().map(|(key, value)| (key.to_owned(), value.to_owned())).collect())
@@ -184,7 +195,7 @@ pub(crate) fn quantiles_of(spans: &[Duration]) -> Quantiles {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, target_os = "linux"))]
 mod tests {
     use std::sync::mpsc::channel;
 

@@ -2,27 +2,37 @@
 
 mod addresses;
 mod control;
+#[cfg(target_os = "linux")]
 mod control_files;
 mod words;
 
 use std::time::Duration;
 
-use cohaptic_realtime::{Pacing, Tolerance, Wishes};
+use cohaptic_realtime::Tolerance;
+#[cfg(target_os = "linux")]
+use cohaptic_realtime::{Pacing, Wishes};
 
 use crate::arguments::PaceArguments;
 
-pub(crate) use addresses::{own_address, reached_from_elsewhere};
-pub(crate) use control::{Edit, KeyedLinks, LiveControl, Look, counters, quantiles, quantiles_of, refused_server, token_of};
+pub(crate) use addresses::{local, own_address, reached_from_elsewhere};
+#[cfg(target_os = "linux")]
+pub(crate) use control::{Edit, KeyedLinks};
+pub(crate) use control::{LiveControl, Look, counters, quantiles, quantiles_of, refused_server, token_of};
+#[cfg(target_os = "linux")]
 pub(crate) use control_files::ControlFiles;
-pub(crate) use words::{ConfiguredDelay, Publisher, carried, counts, late, notes, say, some_length, status};
+pub(crate) use words::{ConfiguredDelay, Publisher, carried, counts, late, say, some_length, status, unicode_words};
+#[cfg(target_os = "linux")]
+pub(crate) use words::notes;
 
 impl PaceArguments {
     /// Returns how the thread waits for its next deadline: by spinning with `--spin`, otherwise by sleeping.
+    #[cfg(target_os = "linux")]
     pub(crate) const fn pacing(&self) -> Pacing {
         if self.spin { Pacing::SPIN } else { Pacing::Sleep }
     }
 
     /// Returns the real-time privileges to ask the system for: none with `--no-priority`, otherwise the default set.
+    #[cfg(target_os = "linux")]
     pub(crate) fn wishes(&self) -> Wishes {
         if self.no_priority { Wishes::NONE } else { Wishes::default() }
     }

@@ -1,11 +1,14 @@
 //! Messages of the commands in real time, and the publisher, which limits the number of snapshots of a run.
 
+use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
 use std::time::{Duration, Instant as Clock};
 
 use cohaptic_control::Snapshot;
-use cohaptic_realtime::{LatenessSummary, Prepared, Validity, Wish};
+use cohaptic_realtime::LatenessSummary;
+#[cfg(target_os = "linux")]
+use cohaptic_realtime::{Prepared, Validity, Wish};
 use cohaptic_units::print::Counted;
 use cohaptic_units::visible_lines;
 use cohaptic_wan::{DropCause, LinkModel, LinkStats};
@@ -26,6 +29,7 @@ pub(crate) fn late(summary: &LatenessSummary) -> String {
 }
 
 /// Lists the granted real-time privileges, each refused privilege with advice, and measures against an invalid run, as indented lines.
+#[cfg(target_os = "linux")]
 pub(crate) fn notes(prepared: &Prepared, validity: Validity) -> String {
     let mut text = String::new();
     let granted: Vec<&str> = prepared.granted.iter().copied().map(Wish::name).collect();
@@ -66,6 +70,15 @@ pub(crate) fn some_length(length: Option<Duration>) -> Result<Option<Duration>, 
         return Err(Failure::Input("--for 0s: expected a time above zero".to_owned()));
     }
     Ok(length)
+}
+
+/// Returns the words of a spec as texts.
+pub(crate) fn unicode_words(spec: &[OsString]) -> Result<Vec<String>, Failure> {
+    let word = |word: &OsString| {
+        let text = word.to_str().ok_or_else(|| Failure::Input(format!("{}: expected words in Unicode", word.to_string_lossy())))?;
+        Ok(text.to_owned())
+    };
+    spec.iter().map(word).collect()
 }
 
 /// Publishes snapshots of a run at limited intervals, because packets wait while a snapshot is taken.
@@ -161,7 +174,7 @@ fn millis(span: Duration) -> String {
     format!("{:.3} ms", span.as_secs_f64() * 1e3)
 }
 
-#[cfg(test)]
+#[cfg(all(test, target_os = "linux"))]
 mod tests {
     use cohaptic_realtime::Refused;
     use cohaptic_units::{Bytes, Ecn, Instant};

@@ -1,6 +1,5 @@
 //! Configuration of a relay, from a relay file or from the options `--listen` and `--to`.
 
-use std::ffi::OsString;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -16,7 +15,7 @@ use crate::arguments::RelayArguments;
 use crate::failure::Failure;
 use crate::input;
 use crate::link::link_and_keys;
-use crate::realtime::{ConfiguredDelay, own_address};
+use crate::realtime::{ConfiguredDelay, local, own_address, unicode_words};
 
 /// Configuration of a relay, with the names and keys for messages and live control.
 pub(super) struct Setup {
@@ -78,10 +77,10 @@ impl Setup {
         if to.port() == 0 {
             return Err(Failure::Input(format!("--to {to}: expected the port of a program, which is not 0")));
         }
-        let (forth, forth_keys) = link_and_keys(&words(&arguments.words)?)?;
+        let (forth, forth_keys) = link_and_keys(&unicode_words(&arguments.words)?)?;
         let (back, back_keys) = match &arguments.back {
             None => (forth.clone(), forth_keys.clone()),
-            Some(spec) => link_and_keys(&words(spec)?)?,
+            Some(spec) => link_and_keys(&unicode_words(spec)?)?,
         };
         let usual = Limits::default();
         let limits = Limits { packets: arguments.packets.unwrap_or(usual.packets), bytes: arguments.bytes.unwrap_or(usual.bytes), ..usual };
@@ -140,23 +139,4 @@ impl Setup {
         };
         self.pairs.iter().zip(edits).map(asked).collect()
     }
-}
-
-fn words(spec: &[OsString]) -> Result<Vec<String>, Failure> {
-    let word = |word: &OsString| {
-        let text = word.to_str().ok_or_else(|| Failure::Input(format!("{}: expected words in Unicode", word.to_string_lossy())))?;
-        Ok(text.to_owned())
-    };
-    spec.iter().map(word).collect()
-}
-
-/// Refuses an address outside this machine's loopback interface.
-fn local(option: &str, address: SocketAddr) -> Result<(), Failure> {
-    if address.ip().is_loopback() {
-        return Ok(());
-    }
-    Err(Failure::Input(format!(
-        "{option} {address} is not on loopback: expected an address such as 127.0.0.1 or ::1, or --allow-remote as well. The relay authenticates nobody: \
-         anybody who reaches its ports can speak through it"
-    )))
 }

@@ -52,6 +52,8 @@ mod paper;
 mod records;
 #[cfg(target_os = "linux")]
 mod relay;
+#[cfg(target_os = "linux")]
+mod relay_tcp;
 #[cfg(unix)]
 mod replays;
 #[cfg(target_os = "linux")]

@@ -54,7 +54,7 @@ impl Running {
     /// Waits for the message about the next port, and returns its address and its purpose.
     pub(crate) fn port(&self) -> (SocketAddr, String) {
         let said = self.said("listening on ");
-        let (address, purpose) = said.split_once(" for datagrams to ").unwrap();
+        let (address, purpose) = said.split_once(" for datagrams to ").or_else(|| said.split_once(" for connections to ")).unwrap();
         (address.parse().unwrap(), purpose.to_owned())
     }
 

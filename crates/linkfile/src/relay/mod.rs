@@ -1,19 +1,22 @@
 //! Relay files: programs talking to each other in real time, with links and ports.
 
 mod programs;
+mod tcp;
 
 use core::time::Duration;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::parameters::{Form, Table, optional, required, usual};
+use cohaptic_wan::parameters::{Form, Key, Table, optional, required, usual};
 
 use crate::document::{FileError, Node, Sources};
 use crate::link::keys::{LINK_CHANGE, LINK_ENTRY, LINK_TABLE, LINKS_BETWEEN, MODULATOR};
 use crate::link::read_modulators;
 use crate::mesh::{KeysOfLinks, LinkChange, LinkClasses, LinkSelector, LinkTable, pairs, read_key_changes, read_links, read_links_between};
 use crate::reading::{Context, TableReader, default_title, defaults, parse, values, with_text};
+
+pub use tcp::{TCP_ROOT, TcpProxy, TcpRelayFile, TcpStream};
 
 /// Checked content of a relay file, for `cohaptic relay FILE`.
 ///
@@ -105,17 +108,19 @@ pub static ROOT: Table = Table::of(&[&[
     optional("links", Form::List(&Form::Table(&LINK_ENTRY)), "One direction between two peers per entry: its own keys are laid over those of [link]"),
     optional("timeline", Form::List(&Form::Table(&TIMELINE)), "Changes while the relay runs"),
 ]]);
-static RELAY: Table = Table::of(&[&[
+static RELAY: Table = Table::of(&[&IDENTITY, &PACKETS, &BYTES, &FORGET, &TOLERANCE]);
+/// Keys of the table `relay` that relays of UDP and of TCP have.
+const IDENTITY: [Key; 3] = [
     optional("title", Form::Text, "Title for people; the name of the file by default"),
     usual("seed", Form::Integer(0, i64::MAX.unsigned_abs()), "0", "Seed of all random numbers"),
     usual("allow-remote", Form::Boolean, "false", "Whether ports and addresses may be on other machines"),
-    // Each datagram in flight takes at least a hundred bytes of memory, so the largest value stands for 1.7 GB.
-    usual("most-packets", Form::Integer(1, 1 << 24), "262144", "Largest number of datagrams in flight at once")
-        .expecting("a number of datagrams, {}"),
-    usual("most-bytes", Form::Size, "\"64MB\"", "Largest number of bytes in flight at once"),
-    usual("forget-after", Form::PositiveDuration, "\"30s\"", "Time of silence after which a learnt address may be replaced"),
-    usual("tolerance", Form::PositiveDuration, "\"1ms\"", "Lateness up to which a datagram is on time"),
-]]);
+];
+// Each datagram in flight takes at least a hundred bytes of memory, so the largest value stands for 1.7 GB.
+const PACKETS: [Key; 1] = [usual("most-packets", Form::Integer(1, 1 << 24), "262144", "Largest number of datagrams in flight at once")
+    .expecting("a number of datagrams, {}")];
+const BYTES: [Key; 1] = [usual("most-bytes", Form::Size, "\"64MB\"", "Largest number of bytes in flight at once")];
+const FORGET: [Key; 1] = [usual("forget-after", Form::PositiveDuration, "\"30s\"", "Time of silence after which a learnt address may be replaced")];
+const TOLERANCE: [Key; 1] = [usual("tolerance", Form::PositiveDuration, "\"1ms\"", "Lateness up to which a datagram is on time")];
 static TIMELINE: Table = Table::of(&[&[
     required("at", Form::Duration, "Time since the beginning").expecting("a time such as \"3s\""),
     required("link", LINKS_BETWEEN, "Links that change: all, or one by its ends")
@@ -198,19 +203,22 @@ fn read_header(node: &Node, context: Context<'_>) -> Option<Header> {
     let mut table = TableReader::new(node, context, &RELAY, "a table such as [relay]")?;
     let title = table.maybe("title", |node, context| values::text(node, context, "a text").map(str::to_owned));
     let (seed, allow_remote, packets) = (table.value("seed"), table.value("allow-remote"), table.value("most-packets"));
-    let bytes = table.read("most-bytes", |node, context| {
-        let size = values::size(node, context)?;
-        if size.get() < LEAST_BYTES {
-            context.fault_at(node, "out of range: expected at least \"65535B\", one datagram");
-            return None;
-        }
-        Some(size)
-    });
+    let bytes = table.read("most-bytes", read_most_bytes);
     let (forget_after, tolerance) = (table.value("forget-after"), table.value("tolerance"));
     table.finish();
     let limits = packets.zip(bytes).zip(forget_after).zip(tolerance);
     let limits = limits.map(|(((packets, bytes), forget_after), tolerance)| RelayLimits { packets, bytes, forget_after, tolerance });
     Some(Header { title, seed, allow_remote, limits })
+}
+
+/// Reads `most-bytes`.
+fn read_most_bytes(node: &Node, context: Context<'_>) -> Option<Bytes> {
+    let size = values::size(node, context)?;
+    if size.get() < LEAST_BYTES {
+        context.fault_at(node, "out of range: expected at least \"65535B\", one datagram");
+        return None;
+    }
+    Some(size)
 }
 
 /// Minimum of `most-bytes` \[bytes\]: the largest UDP datagram must fit.

@@ -80,25 +80,25 @@ fn read_program<'a>(entry: &'a Node, allow_remote: Option<bool>, names: &mut Nam
     Some(Written { program: RelayProgram { name: name?, port: port?, address: address? }, port: port_node?, address: address_node })
 }
 
-/// Reads the name of a program. Programs follow the rule for names of peers, so that links of both are named alike.
-fn read_name(node: &Node, names: &mut Names, context: Context<'_>) -> Option<String> {
+/// Reads the name of a program or of a proxy. Programs follow the rule for names of peers, so that links of both are named alike.
+pub(super) fn read_name(node: &Node, names: &mut Names, context: Context<'_>) -> Option<String> {
     const EXPECTED: &str = "a name, without space and none of . > / , \" and not \"all\"";
     let text = values::text(node, context, EXPECTED)?;
     // Dot and `>` have a meaning in keys and in the names of links.
     let unfit = |c: char| c.is_whitespace() || c.is_control() || matches!(c, '.' | '>' | '/' | ',' | '"');
     if text.is_empty() || text == "all" || text.contains(unfit) {
-        context.fault_at(node, format!("{} cannot be the name of a program: expected {EXPECTED}", quote(text)));
+        context.fault_at(node, format!("{} cannot be the name of a {}: expected {EXPECTED}", quote(text), names.noun()));
         return None;
     }
     if !names.push(text) {
-        context.fault_at(node, format!("there is a program {} already: expected another name", quote(text)));
+        context.fault_at(node, format!("there is a {} {} already: expected another name", names.noun(), quote(text)));
         return None;
     }
     Some(text.to_owned())
 }
 
 /// Reads a socket address, which must be a loopback address unless remote addresses are allowed.
-fn read_address(node: &Node, expected: &str, allow_remote: Option<bool>, context: Context<'_>) -> Option<SocketAddr> {
+pub(super) fn read_address(node: &Node, expected: &str, allow_remote: Option<bool>, context: Context<'_>) -> Option<SocketAddr> {
     let text = values::text(node, context, expected)?;
     let address = match crate::address(text) {
         Ok(address) => address,

@@ -14,6 +14,7 @@ pub mod link {
 
 pub use crate::exec::ROOT as EXEC;
 pub use crate::relay::ROOT as RELAY;
+pub use crate::relay::TCP_ROOT as TCP_RELAY;
 pub use crate::router::read::ROOT as ROUTER;
 pub use cohaptic_wan::parameters::{Choices, Form, Key, Need, Table, Words, joined, number, optional, required, somewhere, usual, vector, words};
 pub use json::json_schema;

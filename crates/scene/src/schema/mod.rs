@@ -13,6 +13,8 @@ pub enum FileSchema {
     Scene,
     /// A relay file, for `cohaptic relay`.
     Relay,
+    /// A relay file for TCP, for `cohaptic relay --tcp`.
+    RelayTcp,
     /// A router file, for `cohaptic router`.
     Router,
     /// A file of hosts with commands, for `cohaptic exec`.
@@ -21,7 +23,7 @@ pub enum FileSchema {
 
 impl FileSchema {
     /// Every kind of file.
-    pub const ALL: [Self; 4] = [Self::Scene, Self::Relay, Self::Router, Self::Exec];
+    pub const ALL: [Self; 5] = [Self::Scene, Self::Relay, Self::RelayTcp, Self::Router, Self::Exec];
 
     /// Returns the keys at the top level of a file of this kind.
     #[must_use]
@@ -29,6 +31,7 @@ impl FileSchema {
         match self {
             Self::Scene => &crate::read::ROOT,
             Self::Relay => &schema::RELAY,
+            Self::RelayTcp => &schema::TCP_RELAY,
             Self::Router => &schema::ROUTER,
             Self::Exec => &schema::EXEC,
         }
@@ -40,6 +43,7 @@ impl FileSchema {
         match self {
             Self::Scene => "cohaptic scene",
             Self::Relay => "cohaptic relay file",
+            Self::RelayTcp => "cohaptic relay file for TCP",
             Self::Router => "cohaptic router file",
             Self::Exec => "cohaptic exec file",
         }

@@ -78,9 +78,13 @@ pub(super) fn pages() -> [(&'static str, String); 3] {
     let scenes = head("Reference: keys of scenes", OF_SCENES) + &reference.file(FileSchema::Scene, "##", "Scene");
     reference.page = NETWORKS;
     let mut networks = head("Reference: keys of relays, routers and exec", OF_NETWORKS);
-    for (kind, heading, name) in
-        [(FileSchema::Relay, "Relay files", "Relay"), (FileSchema::Router, "Router files", "Router"), (FileSchema::Exec, "Exec files", "Exec")]
-    {
+    let kinds = [
+        (FileSchema::Relay, "Relay files", "Relay"),
+        (FileSchema::RelayTcp, "Relay files for TCP", "Relay of TCP"),
+        (FileSchema::Router, "Router files", "Router"),
+        (FileSchema::Exec, "Exec files", "Exec"),
+    ];
+    for (kind, heading, name) in kinds {
         networks += &format!("## {heading}\n\n{}", reference.file(kind, "###", name));
     }
     [(LINKS, links), (SCENES, scenes), (NETWORKS, networks)].map(|(page, text)| (page, text.trim_end().to_owned() + "\n"))

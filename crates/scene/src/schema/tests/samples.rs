@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use cohaptic_linkfile::router::RouterFile;
-use cohaptic_linkfile::{ExecFile, RelayFile};
+use cohaptic_linkfile::{ExecFile, RelayFile, TcpRelayFile};
 
 use crate::schema::FileSchema;
 use crate::{Scene, SceneError, scene_files};
@@ -138,6 +138,16 @@ const RELAY: &str = r#"
     timeline = [{ at = "1s", link = { from = "left", to = "right" }, set = { delay = "8ms" } }, { at = "2s", link = "all", set = { loss = 0.1 } }]
 "#;
 
+const RELAY_TCP: &str = r#"
+    relay = {}
+    [[proxies]]
+    name = "store"
+    listen = "127.0.0.1:7379"
+    to = "127.0.0.1:6379"
+    forth = { delay = "20ms", close-after = { after = "2s" }, reset-after = { after = "2s" }, stall = { after = "1s" } }
+    back = { rate = "1Mbit", slice = { size = "100B" }, cut-after = { size = "1kB" }, slow-close = { time = "1s" } }
+"#;
+
 const ROUTER: [&str; 2] = [
     r#"
     router = { default = { left-to-right = "wan", right-to-left = "pass" }, memory = { packets = 10 } }
@@ -175,6 +185,7 @@ pub(super) fn samples() -> Vec<Sample> {
     let mut samples: Vec<Sample> = SCENES.iter().map(|text| of(FileSchema::Scene, text)).collect();
     samples.push(of(FileSchema::Relay, RELAY));
     samples.push(of(FileSchema::Exec, EXEC));
+    samples.push(of(FileSchema::RelayTcp, RELAY_TCP));
     samples.extend(ROUTER.iter().map(|text| of(FileSchema::Router, text)));
     let mut files = scene_files(&root().join("scenarios")).unwrap();
     files.push(root().join("crates/scene/tests/integration/data/every-key.toml"));
@@ -189,6 +200,12 @@ pub(super) fn read(sample: &Sample, overrides: &[String]) -> Result<String, Scen
         FileSchema::Scene => Scene::parse(text, path, overrides).map(|scene| format!("{scene:?}")),
         FileSchema::Relay => RelayFile::parse(text, path, overrides).map(|relay| format!("{relay:?}")),
         FileSchema::Exec => ExecFile::parse(text, path, overrides).map(|exec| format!("{exec:?}")),
+        FileSchema::RelayTcp => TcpRelayFile::parse(text, path, overrides).map(|relay| {
+            // Configurations of the streams, not their keys as written, which a relay keeps for live control.
+            let streams: Vec<_> =
+                relay.proxies.iter().map(|proxy| (&proxy.name, proxy.listen, proxy.to, &proxy.forth.config, &proxy.back.config)).collect();
+            format!("{:?} {:?} {:?} {:?} {streams:?}", relay.title, relay.seed, relay.most_bytes, relay.tolerance)
+        }),
         FileSchema::Router => RouterFile::parse(text, path, overrides).map(|router| {
             // The models of the links, not their keys as written, which a router keeps for live control.
             let links: Vec<_> = router.links.iter().map(|link| (&link.name, &link.model)).collect();

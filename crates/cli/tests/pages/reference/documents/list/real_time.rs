@@ -2,7 +2,7 @@
 
 use super::Document;
 
-pub(super) const REAL_TIME: [Document; 11] = [
+pub(super) const REAL_TIME: [Document; 12] = [
     Document {
         command: "live",
         lines: &[
@@ -61,6 +61,32 @@ pub(super) const REAL_TIME: [Document; 11] = [
             ("unsent", "out of their links, not sent before the end"),
             ("clients_without_socket", "clients for which no socket could be had"),
             ("granted, refused_wishes", "what the system granted and refused"),
+        ],
+    },
+    Document {
+        command: "relay --tcp",
+        lines: &["cohaptic relay --tcp --listen 127.0.0.1:0 --to 127.0.0.1:9 --for 50ms --json"],
+        rows: &[
+            ("title, duration_s, ending", "of the file, or `LISTEN -> TO`; how long it ran; `complete` (`--for`) or `interrupted`"),
+            ("valid, release_error_us.@Lateness", "whether writes were as late as tolerated; of the first write of each batch of bytes"),
+            ("proxies[].name, proxies[].listen, proxies[].to", "of each proxy"),
+            ("proxies[].connections.opened, proxies[].connections.refused", "connections of clients; those that the program refused"),
+            ("proxies[].connections.ended, proxies[].connections.reset", "ended by both ends; reset by an end"),
+            (
+                "proxies[].connections.close_after, proxies[].connections.reset_after, proxies[].connections.cut_after",
+                "ended by a [fault](relay.md#faults-of-connections)",
+            ),
+            ("proxies[].lines[].from, proxies[].lines[].to", "forth, then back"),
+            (
+                "proxies[].lines[].received_bytes, proxies[].lines[].sent_bytes, proxies[].lines[].lost_bytes",
+                "read, written, and lost by a fault or with a closed connection; the rest of what was read is held",
+            ),
+            (
+                "proxies[].lines[].pieces, proxies[].lines[].mean_delay_s",
+                "pieces that passed the line, ends of streams among them; `null` if none did",
+            ),
+            ("proxies[].lines[].asked_mean_delay_s, proxies[].lines[].changes", "at the beginning; changes since"),
+            ("open, held_bytes", "connections and bytes at the end"),
         ],
     },
     Document {
