@@ -2,6 +2,7 @@
 //! terms of its pages.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail as tests do")]
 
+mod actions;
 mod dependencies;
 mod metadata;
 mod packages;
