@@ -42,7 +42,11 @@ pub(super) fn after_measurements(examples: &[&str]) -> String {
 
 /// Returns the examples of the program, the meanings of the exit status, and on systems other than Linux the commands that need Linux.
 pub(super) fn of_program() -> String {
-    let needs = if cfg!(target_os = "linux") { "" } else { "\n\nThese commands need Linux: exec, falcon, inverse3, join, live, play, relay without --tcp, router." };
+    let needs = if cfg!(target_os = "linux") {
+        ""
+    } else {
+        "\n\nThese commands need Linux: exec, falcon, inverse3, join, live, play, relay without --tcp, router."
+    };
     after(PROGRAM) + needs
 }
 

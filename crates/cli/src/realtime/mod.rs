@@ -20,9 +20,9 @@ pub(crate) use control::{Edit, KeyedLinks};
 pub(crate) use control::{LiveControl, Look, counters, quantiles, quantiles_of, refused_server, token_of};
 #[cfg(target_os = "linux")]
 pub(crate) use control_files::ControlFiles;
-pub(crate) use words::{ConfiguredDelay, Publisher, carried, counts, late, say, some_length, status, unicode_words};
 #[cfg(target_os = "linux")]
 pub(crate) use words::notes;
+pub(crate) use words::{ConfiguredDelay, Publisher, carried, counts, late, say, some_length, status, unicode_words};
 
 impl PaceArguments {
     /// Returns how the thread waits for its next deadline: by spinning with `--spin`, otherwise by sleeping.

@@ -121,9 +121,9 @@ fn with_the_key_it_takes_part_and_after_a_loss_of_power_it_joins_again() {
     let mut rows = trajectory.lines();
     assert_eq!(rows.next(), Some("t,peer,xh,vh,xo,vo,xd,vd,fc,ft"));
     // Tick 0 is the welcome, and every tick is a row of this peer alone.
-    for (tick, row) in rows.enumerate() {
+    for (tick, row) in (0_u32..).zip(rows) {
         let (t, rest) = row.split_once(',').unwrap();
-        assert!((t.parse::<f64>().unwrap() - tick as f64 * 1e-3).abs() < 1e-12 && rest.starts_with("left,"), "{row}");
+        assert!((t.parse::<f64>().unwrap() - f64::from(tick) * 1e-3).abs() < 1e-12 && rest.starts_with("left,"), "{row}");
     }
     assert!(desk.read("left/lateness.csv").contains("\ntick,"));
     let document = parse(&session.end_by("-INT").stdout);
