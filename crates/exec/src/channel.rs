@@ -12,7 +12,7 @@ use rustix::net::{
     SocketType, recvmsg, sendmsg, socketpair,
 };
 
-/// One end of a channel.
+/// End of a channel.
 #[derive(Debug)]
 pub(crate) struct Channel {
     socket: OwnedFd,

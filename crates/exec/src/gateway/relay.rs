@@ -1,4 +1,4 @@
-//! One connection beyond the link: the end of TCP inside, the socket outside, and the data between both.
+//! Connection beyond the link: the end of TCP inside, the socket outside, and the data between both.
 
 use std::io::{self, Read as _, Write as _};
 use std::net::{Shutdown, TcpStream};
@@ -119,7 +119,7 @@ impl Relay {
     }
 }
 
-/// One side has ended by a reset, a time-out or another failure.
+/// End of a side by a reset, a time-out or another failure.
 struct Broken;
 
 impl From<Error> for Broken {

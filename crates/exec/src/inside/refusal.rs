@@ -8,7 +8,7 @@ use std::path::Path;
 struct Setting {
     /// File below `/proc/sys`.
     file: &'static str,
-    /// Whether zero forbids, or else every other value.
+    /// `true` if zero forbids, `false` if every other value does.
     zero_forbids: bool,
     /// Value that allows.
     allows: &'static str,

@@ -1,4 +1,4 @@
-//! What a host inside looks like, as the text of one argument.
+//! Network and names of a host inside, as the text of one argument.
 
 use core::net::IpAddr;
 

@@ -83,7 +83,7 @@ pub struct Outcome {
     pub status: u8,
     /// Exit status of each command, or `None` for a command that did not end by itself in time.
     pub statuses: Vec<Option<u8>>,
-    /// What passed the links.
+    /// Counters of the links.
     pub report: Report,
 }
 
@@ -102,7 +102,7 @@ pub struct Report {
     pub refused: Vec<u64>,
     /// Lateness of the packets.
     pub release: LatenessSummary,
-    /// Whether the packets were on time.
+    /// Verdict about the lateness.
     pub validity: Validity,
     /// Answers of the system to the requests of the thread.
     pub prepared: Prepared,
