@@ -4,8 +4,8 @@
 //! cargo run --release -p cohaptic-exec --example gateway_table
 //! ```
 //!
-//! A server of the machine speaks with a client, first without any network between both, then through the gateway over links of several delays. The client is this
-//! program too.
+//! A server of the machine speaks with a client, first without any network between both, then through the gateway over links of several delays. The client is
+//! this program too.
 #![allow(clippy::print_stdout, clippy::disallowed_methods, reason = "time is measured, and a table is printed")]
 
 use std::error::Error;

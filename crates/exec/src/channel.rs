@@ -1,7 +1,7 @@
 //! Messages between this program outside and the process that begins a command inside the namespaces.
 //!
-//! A channel is a pair of Unix sockets that keep the bounds of messages. It exists before the namespaces, so that it leads out of them. The end of one process is
-//! the end of its socket: the other process learns of a death without a message.
+//! A channel is a pair of Unix sockets that keep the bounds of messages. It exists before the namespaces, so that it leads out of them. The end of one
+//! process is the end of its socket: the other process learns of a death without a message.
 
 use std::io::{self, IoSlice, IoSliceMut};
 use std::mem::MaybeUninit;

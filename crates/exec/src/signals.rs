@@ -1,9 +1,9 @@
 //! Signals that reach the command once.
 //!
-//! All processes of an `exec` are in one process group. A signal of the terminal (Ctrl-C) reaches the whole group, the command included. A signal that another
-//! process sends to the program alone must be passed on to the command, and a signal that another process sends to the whole group must not. The system does not
-//! tell both apart, but process 1 can: it is in the group too. The program waits a moment before it passes a signal on, and process 1 drops what it has got
-//! itself meanwhile.
+//! All processes of an `exec` are in one process group. A signal of the terminal (Ctrl-C) reaches the whole group, the command included. A signal that
+//! another process sends to the program alone must be passed on to the command, and a signal that another process sends to the whole group must not. The
+//! system does not tell both apart, but process 1 can: it is in the group too. The program waits a moment before it passes a signal on, and process 1 drops
+//! what it has got itself meanwhile.
 
 use core::time::Duration;
 use std::io;

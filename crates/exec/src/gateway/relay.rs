@@ -12,8 +12,8 @@ pub(super) const PIECE: usize = 1 << 16;
 
 /// Two ends that pass data to each other: a connection with the program inside, and a socket of the real machine.
 ///
-/// Each direction ends by itself, as TCP allows: an end of data on one side becomes an end of data on the other side, after all data. A reset on one side becomes
-/// a reset on the other side, and data that waits is lost with both, as on one connection.
+/// Each direction ends by itself, as TCP allows: an end of data on one side becomes an end of data on the other side, after all data. A reset on one side
+/// becomes a reset on the other side, and data that waits is lost with both, as on one connection.
 #[derive(Debug)]
 pub(super) struct Relay {
     pub(super) connection: Connection,

@@ -21,8 +21,8 @@ pub(super) fn mount_processes() {
     let _ = mount(Some("proc"), "/proc", Some("proc"), flags, NONE);
 }
 
-/// Lets the command send echo requests and listen at low ports, as the network is its own. Where /proc/sys cannot be written, as in some containers, the command
-/// has the rights of its user.
+/// Lets the command send echo requests and listen at low ports, as the network is its own. Where /proc/sys cannot be written, as in some containers, the
+/// command has the rights of its user.
 pub(super) fn allow_ordinary_users() {
     let group = nix::unistd::getegid();
     let _ = fs::write("/proc/sys/net/ipv4/ping_group_range", format!("{group} {group}"));

@@ -71,8 +71,8 @@ fn run(channel: &Channel, command: &[OsString], input: OwnedFd) -> Report {
     }
 }
 
-/// Waits for the end of the command, and returns its status. Passes signals on meanwhile. The end of the program outside is the end of this process, and with it
-/// of all processes of the namespace.
+/// Waits for the end of the command, and returns its status. Passes signals on meanwhile. The end of the program outside is the end of this process, and with
+/// it of all processes of the namespace.
 fn watch(channel: &Channel, signals: &SignalFd, child: Pid) -> io::Result<u8> {
     let mut group = SigSet::empty();
     // SIGCHLD was let through while the command started, so that the signal of a command that ended then is lost.

@@ -4,9 +4,9 @@
 //!   this program ── starts itself ──▶ enter: new namespaces, device, names ── starts itself ──▶ init: process 1, starts the command
 //! ```
 //!
-//! No process can move into a new process namespace itself, only its children can; and a process with several threads cannot have a new user namespace. So the
-//! program starts itself again, twice, by arguments that no user types. Process 1 is this program, not the command: the system ignores signals to process 1 that
-//! it does not handle, and the command would have to wait for the orphans of the namespace.
+//! No process can move into a new process namespace itself, only its children can; and a process with several threads cannot have a new user namespace. So
+//! the program starts itself again, twice, by arguments that no user types. Process 1 is this program, not the command: the system ignores signals to process
+//! 1 that it does not handle, and the command would have to wait for the orphans of the namespace.
 
 mod enter;
 mod files;

@@ -47,7 +47,8 @@ fn way_out(folder: &Path) -> String {
     };
     let found: Vec<String> = SETTINGS.iter().filter_map(forbids).collect();
     let first = if found.is_empty() {
-        "this system, or the container around it, does not allow namespaces to this user. Root may make namespaces, and a container with `--privileged`".to_owned()
+        "this system, or the container around it, does not allow namespaces to this user; root may make them, and a container with `--privileged`"
+            .to_owned()
     } else {
         format!("this system does not allow namespaces to ordinary users. As root, allow them with {}", found.join(" and "))
     };

@@ -59,8 +59,8 @@ impl Packet {
         })
     }
 
-    /// Returns a packet of IP around a transport header with its data, whose checksum stays as it is, such as the whole of a packet that was cut. Returns `None`
-    /// if the addresses differ in their version, or the packet is too long.
+    /// Returns a packet of IP around a transport header with its data, whose checksum stays as it is, such as the whole of a packet that was cut. Returns
+    /// `None` if the addresses differ in their version, or the packet is too long.
     #[must_use]
     pub fn around_segment(source: IpAddr, destination: IpAddr, protocol: Protocol, segment: &[u8]) -> Option<Self> {
         Self::quoted(source, destination, protocol, segment).map(Self::checked)

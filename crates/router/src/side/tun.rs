@@ -22,8 +22,8 @@ const WAITING: u32 = 2_000;
 
 /// TUN device. A device made by the router disappears with this value.
 ///
-/// A process without the right to make the device can use the device of another process: [`into_descriptor`](Self::into_descriptor) on one side of a Unix socket,
-/// [`of_descriptor`](Self::of_descriptor) on the other side.
+/// A process without the right to make the device can use the device of another process: [`into_descriptor`](Self::into_descriptor) on one side of a Unix
+/// socket, [`of_descriptor`](Self::of_descriptor) on the other side.
 pub struct Tun {
     device: File,
     name: String,
