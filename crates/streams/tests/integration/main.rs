@@ -1,4 +1,6 @@
 //! Tests of the relay of TCP: the engine in virtual time, and real sockets on loopback.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail as tests do")]
+#![allow(clippy::cast_possible_truncation, reason = "contents of bytes, and small numbers")]
 
 mod engine;
 mod faults;
