@@ -22,7 +22,7 @@ impl Yaml {
         let lines: Vec<&str> = text.lines().collect();
         let mut at = 0;
         let read = Self::block(&lines, &mut at, 0);
-        assert!(lines[at..].iter().all(|line| !is_content(&line)), "not read: {:?}", lines.get(at));
+        assert!(lines[at..].iter().all(|line| !is_content(line)), "not read: {:?}", lines.get(at));
         read
     }
 
@@ -232,6 +232,7 @@ fn action_and_workflows_call_commands_that_exist() {
 /// A release from a folder: the archive of `.ci/binary` with a script in place of the program.
 #[test]
 #[cfg(unix)]
+#[expect(clippy::print_stderr, reason = "a test that is skipped says so")]
 fn the_action_installs_the_program_of_a_release_and_no_changed_one() {
     let missing = ["curl", "python3", "tar"].into_iter().find(|tool| Command::new(tool).arg("--version").output().is_err());
     if let Some(tool) = missing {
