@@ -1,8 +1,9 @@
-//! Writes `docs/measured-relay.md`: `cargo run --profile dist -p cohaptic-benches-realtime --bin relay-table > docs/measured-relay.md`. Takes about two minutes; a
-//! number of seconds as argument replaces the ten of each run.
+//! Writes `docs/measured-relay.md`: `cargo run --profile dist -p cohaptic-benches-realtime --bin relay-table > docs/measured-relay.md`. Takes about three minutes; a
+//! number of seconds as argument replaces the ten of each run, and `tcp` after it prints the section on connections of TCP alone.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "counts of packets")]
 
+mod connections;
 mod subjects;
 mod traffic;
 
@@ -12,6 +13,7 @@ use std::time::Duration;
 use cohaptic_benches_realtime::machine::{self, Processors};
 use cohaptic_benches_realtime::waiting::Waiting;
 use cohaptic_realtime::{LatenessSummary, Pacing};
+use connections::Between;
 use subjects::{Outcome, bare_thread, relay, tokio_forwarder};
 
 /// Packets a second of the first table.
@@ -23,13 +25,41 @@ const RATES: [u64; 6] = [50_000, 100_000, 150_000, 250_000, 300_000, 400_000];
 fn main() -> Result<(), Box<dyn Error>> {
     let seconds = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(10);
     let span = Duration::from_secs(seconds);
+    if std::env::args().nth(2).is_some_and(|part| part == "tcp") {
+        return connections_of_tcp(span);
+    }
     println!("# The relay: how late and how fast\n");
     println!("Lateness and speed of [`cohaptic relay`](relay.md) on loopback. This page is written by\n");
     println!("    cargo run --profile dist -p cohaptic-benches-realtime --bin relay-table > docs/measured-relay.md\n");
     println!("and measured on: {}. Each row is a run of {seconds} s, all of them one after the other in one process, with the", machine::name());
     println!("generator and the sink in it, on the same cores. Datagrams carry {} bytes.\n", traffic::SIZE);
     release_error(span)?;
-    rates(span)
+    rates(span)?;
+    println!();
+    connections_of_tcp(span)
+}
+
+fn connections_of_tcp(span: Duration) -> Result<(), Box<dyn Error>> {
+    println!("## Connections of TCP\n");
+    println!(
+        "One connection over loopback, with [`cohaptic relay --tcp`](relay.md#connections-of-tcp) or another program between client and server, in runs of"
+    );
+    println!(
+        "{} s, on {}. *Added* is the time of a round trip of 64 bytes, less the delay that the keys ask for: 10 ms",
+        span.as_secs(),
+        machine::name()
+    );
+    println!("with `delay = \"5ms\"` both ways. *Carried* is what the server reads of a client that writes as much as it can.\n");
+    println!("| between | added p50 \\[µs\\] | p99 \\[µs\\] | max \\[µs\\] | carried \\[MB/s\\] |");
+    println!("| --- | ---: | ---: | ---: | ---: |");
+    for between in Between::ALL {
+        let times = connections::round_trips(&between, span)?.summary();
+        let [p50, p99, max] = [times.p50, times.p99, times.max].map(|time| micros(time.saturating_sub(between.asked())));
+        let carried = connections::throughput(&between, span)? / 1e6;
+        println!("| {} | {p50} | {p99} | {max} | {carried:.1} |", between.name());
+    }
+    println!("\n100 Mbit/s are 12.5 MB/s. Without a rate a connection carries at most its `buffer`, 6 MiB, per delay: 1258 MB/s with 5 ms.");
+    Ok(())
 }
 
 fn release_error(span: Duration) -> Result<(), Box<dyn Error>> {
