@@ -73,8 +73,17 @@ impl Forwarding {
 impl Core {
     /// Returns the path of a packet's first link, on the way from a host to another. `None` if no way leads there, or for a broadcast or multicast to another
     /// network.
+    #[inline(always)]
     pub(super) fn first_hop(&self, path: Path, ends: &Ends) -> Option<Path> {
-        let Some(forwarding) = &self.forwarding else { return Some(path) };
+        // Most runs have no forwarding, and each segment of TCP asks.
+        match &self.forwarding {
+            None => Some(path),
+            Some(forwarding) => self.first_hop_of(forwarding, path, ends),
+        }
+    }
+
+    #[inline(never)]
+    fn first_hop_of(&self, forwarding: &Forwarding, path: Path, ends: &Ends) -> Option<Path> {
         // A host with several interfaces sends by the interface with the source address of the packet, and receives by the interface with the destination.
         let from = self.plan.node_at(path.from, ends.from, ends.is_six)?;
         let to = if ends.is_broadcast() || ends.is_multicast() {

@@ -94,6 +94,7 @@ impl Core {
     }
 
     /// Hands a segment to its link.
+    #[inline]
     fn emit_on(&mut self, path: Path, addresses: Ends, connection: Option<ConnId>, segment: Segment<'static>) {
         // The entry is made before the offer, which takes the segment, and noted after the offer, so that the trace has the sending first.
         let happening = self.wire.recording().traces.then(|| self.described(self.wire.next_packet(path), connection, &segment));
