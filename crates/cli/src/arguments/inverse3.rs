@@ -118,10 +118,10 @@ pub(crate) struct Inverse3SimulateArguments {
 /// Format of the messages of a simulated service.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub(crate) enum FormatName {
-    /// Forces in `values`, no presets
+    /// Forces in values, no presets
     #[value(name = "3.1")]
     Old,
-    /// Forces in `vector`, and presets
+    /// Forces in vector, and presets
     #[value(name = "3.5")]
     Current,
 }

@@ -38,6 +38,7 @@ fn device(scene: &Scene, place: usize, faults: Vec<Fault>) -> Box<dyn Device> {
     let (PeerKind::Inverse3(_, spec), Some(cohaptic_peer::Hand::Arm { arm, follows })) = (&peer.kind, peer.hand.clone()) else {
         panic!("an Inverse3 in a hand: {peer:?}")
     };
+    let by_chance = faults.iter().any(|fault| matches!(fault.when, When::Chance(_)));
     let config =
         ServiceConfig { seed: place as u64, mass: peer.device.mass + arm.mass, damping: peer.device.damping, faults, ..ServiceConfig::default() };
     let hand = move |now: Instant, position: [f64; 3], velocity: [f64; 3]| {
@@ -49,7 +50,8 @@ fn device(scene: &Scene, place: usize, faults: Vec<Fault>) -> Box<dyn Device> {
     let limits = cohaptic_device::Limits { force: spec.force_limit, ..ClientConfig::DEFAULT.limits };
     let mut device = SteppedInverse3::new(Service::new(config, hand), ClientConfig { limits, ..ClientConfig::DEFAULT }).unwrap();
     device.wait(ARMING);
-    assert_eq!(device.snapshot().phase, Phase::Active);
+    // Faults by chance may disarm the device even before the session.
+    assert!(by_chance || device.snapshot().phase == Phase::Active, "{:?}", device.snapshot());
     Box::new(device)
 }
 
@@ -109,7 +111,7 @@ fn the_replay_of_a_session_with_each_fault_is_equal_to_the_byte() {
         // A second reply is passed over; every other fault shows in the readings.
         assert_eq!(faulty["inputs.csv"] != whole["inputs.csv"], kind != FaultKind::Doubled, "{}", kind.name());
     }
-    let chance = |kind| Fault { kind, when: When::Chance(0.01) };
+    let chance = |kind| Fault { kind, when: When::Chance(0.002) };
     let faults: Vec<Fault> = FaultKind::ALL.into_iter().filter(|kind| kind.hits_replies()).map(chance).collect();
     let (faulty, _) = session(&scene, &faults);
     assert_same(&faulty, &session(&scene, &faults).0, "the same seed");
