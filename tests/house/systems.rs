@@ -7,7 +7,7 @@ use crate::house::metadata::{Tree, metadata};
 use crate::house::{files, name, root};
 
 /// Packages that use nothing of Linux.
-const PORTABLE: [&str; 18] = [
+const PORTABLE: [&str; 19] = [
     "sockets",
     "units",
     "device",

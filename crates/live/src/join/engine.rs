@@ -141,7 +141,7 @@ impl JoinedPeer {
         let spec = &scene.peers[place];
         let start = scene.initial_device(place);
         let (in_hand, device) = match device {
-            Some(device) => (true, JoinedDevice::InHand { device: Box::new(GatedDevice::new(device, clock.tick)), read: start }),
+            Some(device) => (true, JoinedDevice::InHand { device: Box::new(GatedDevice::new(device, clock.tick)), read: start, is_coupled: false }),
             None => (false, JoinedDevice::Simulated(SimulatedDevice::new(spec.device, spec.hand.as_ref(), start, scene.integrator, &clock))),
         };
         let object = ObjectCopy::new(scene.copy_config(place), scene.initial_state(place), scene.integrator, &clock);
@@ -288,6 +288,7 @@ impl JoinedPeer {
         self.silences += u64::from(self.coupling.session && !is_heard);
         let device = self.peer.device_mut().attend(local, now, axes);
         self.coupling.attend(local, device, is_heard);
+        self.peer.device_mut().couple(self.coupling.is_there());
         self.peer.set_coupling(self.coupling.at(local));
         self.others.tell(local, &mut self.peer);
         let forces = self.peer.compute_over(local, self.clock.tick);

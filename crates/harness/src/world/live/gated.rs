@@ -73,9 +73,18 @@ impl GatedDevice {
 
     /// Applies a force \[N\] on the hand until the next tick, as far as the gate admits the force. A device without a reading at this tick gives no force.
     pub fn hold(&mut self, now: Instant, span: Duration, wanted: [f64; 3]) {
+        self.admit(now, span, wanted, Some(self.clock));
+    }
+
+    /// Ends the force until the next tick, at once: without a setpoint the gate admits no force, and the next force grows from zero.
+    pub fn let_go(&mut self, now: Instant, span: Duration) {
+        self.admit(now, span, [0.0; 3], None);
+    }
+
+    fn admit(&mut self, now: Instant, span: Duration, wanted: [f64; 3], setpoint_at: Option<Instant>) {
         let Self { clock, is_read, reading_at, .. } = *self;
         // The device returns no reading if the user has not switched forces on, so a read device is armed.
-        let moment = Moment { now: clock, ready: is_read, armed: is_read, reading_at, setpoint_at: Some(clock) };
+        let moment = Moment { now: clock, ready: is_read, armed: is_read, reading_at, setpoint_at };
         let admitted = self.gate.admit(wanted, &moment);
         self.stats.count(admitted.verdict);
         self.device.hold(now, span, admitted.force);
