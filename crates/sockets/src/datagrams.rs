@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::io;
-use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::task::{Context, Poll};
 
 use crate::Configured;
@@ -59,6 +59,30 @@ pub enum Membership {
     },
 }
 
+/// A received datagram.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Received<'a> {
+    /// Content.
+    pub bytes: &'a [u8],
+    /// Address of the sender.
+    pub from: SocketAddr,
+    /// Address to which the datagram was sent.
+    pub to: IpAddr,
+    /// ECN codepoint on arrival, from 0 to 3 (RFC 3168, section 5).
+    pub ecn: u8,
+}
+
+/// Properties of one sent datagram, beside its content.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub struct Sending {
+    /// Address of the receiver; `None` for the peer of a connected socket.
+    pub to: Option<SocketAddr>,
+    /// Address of the sender, which must be an address of the host; `None` if the host chooses.
+    pub from: Option<IpAddr>,
+    /// ECN codepoint, from 0 to 3; 0 if the type of service of the socket decides.
+    pub ecn: u8,
+}
+
 /// UDP socket.
 ///
 /// [`Datagrams::poll_receive`] and [`Datagrams::poll_readable`] register the waker of the context with [`Poll::Pending`]; `try_receive` returns
@@ -66,16 +90,20 @@ pub enum Membership {
 /// every thread but the thread of the run.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
 pub trait Datagrams: Configured + fmt::Debug + Send + Sync {
-    /// Hands the next datagram and its sender to `take`. The datagram stays in the buffer if `peek` is set.
-    fn poll_receive(&self, cx: &mut Context<'_>, peek: bool, take: &mut dyn FnMut(&[u8], SocketAddr)) -> Poll<io::Result<()>>;
+    /// Hands the next datagram to `take`. The datagram stays in the buffer if `peek` is set.
+    fn poll_receive(&self, cx: &mut Context<'_>, peek: bool, take: &mut dyn FnMut(Received<'_>)) -> Poll<io::Result<()>>;
     /// Like [`Datagrams::poll_receive`], but does not wait.
-    fn try_receive(&self, peek: bool, take: &mut dyn FnMut(&[u8], SocketAddr)) -> io::Result<()>;
+    fn try_receive(&self, peek: bool, take: &mut dyn FnMut(Received<'_>)) -> io::Result<()>;
     /// Waits until a datagram or an error can be received.
     fn poll_readable(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>>;
     /// Returns whether a datagram or an error can be received.
     fn is_readable(&self) -> io::Result<bool>;
+    /// Sends a datagram. Returns the number of bytes. Fails with `EINVAL` if the address of the sender is no address of the host.
+    fn send_as(&self, bytes: &[u8], sending: Sending) -> io::Result<usize>;
     /// Sends a datagram to `to`, or to the peer if the socket is connected. Returns the number of bytes.
-    fn send(&self, bytes: &[u8], to: Option<SocketAddr>) -> io::Result<usize>;
+    fn send(&self, bytes: &[u8], to: Option<SocketAddr>) -> io::Result<usize> {
+        self.send_as(bytes, Sending { to, ..Sending::default() })
+    }
     /// Connects the socket to a peer.
     fn connect(&self, to: SocketAddr) -> io::Result<()>;
     /// Returns the socket's local address.

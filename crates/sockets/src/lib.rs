@@ -17,6 +17,7 @@
 //! ```
 
 mod datagrams;
+mod outside;
 mod settings;
 mod streams;
 mod tasks;
@@ -28,14 +29,19 @@ use std::io;
 use std::net::SocketAddr;
 use std::panic::Location;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
-pub use datagrams::{DatagramOption, Datagrams, Membership};
+pub use datagrams::{DatagramOption, Datagrams, Membership, Received, Sending};
+pub use outside::{Outside, catches_calls, outside};
 pub use settings::{Configured, KeepaliveTimes, Setting};
 pub use streams::{ByteStream, Connecting, Flag, Listener, Number, Ready, Socket, Stream};
 pub use tasks::{Hold, Host, OnHost, Signals, Stop, host, on_host};
 pub use unix::{UnixDatagrams, UnixListener, UnixName, UnixSocket, UnixStream};
 
 thread_local! {
+    /// `true` while a test bed runs on this thread. Beside `BED`, because a value that needs no drop is read without registering a destructor, which takes memory:
+    /// layer C asks within every call of the system, on every thread.
+    static IS_IN_BED: Cell<bool> = const { Cell::new(false) };
     static BED: RefCell<Option<Arc<dyn Bed>>> = const { RefCell::new(None) };
     /// Seed of the runtime of tokio that the test kit builds next on this thread.
     static RUNTIME_SEED: Cell<Option<u64>> = const { Cell::new(None) };
@@ -57,8 +63,17 @@ pub fn take_runtime_seed() -> Option<u64> {
 pub struct Call {
     /// Name of the function, such as `TcpStream::connect`.
     pub name: &'static str,
-    /// Place of the call in the program.
-    pub place: &'static Location<'static>,
+    /// Place of the call in the program; `None` for a call of the system, whose caller is not known.
+    pub place: Option<&'static Location<'static>>,
+}
+
+impl fmt::Display for Call {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.place {
+            Some(place) => write!(f, "`{}` at {place}", self.name),
+            None => write!(f, "the call `{}` of the system", self.name),
+        }
+    }
 }
 
 impl Call {
@@ -66,8 +81,23 @@ impl Call {
     #[track_caller]
     #[must_use]
     pub fn here(name: &'static str) -> Self {
-        Self { name, place: Location::caller() }
+        Self { name, place: Some(Location::caller()) }
     }
+
+    /// Describes the call `name` of the system.
+    #[must_use]
+    pub const fn of_system(name: &'static str) -> Self {
+        Self { name, place: None }
+    }
+}
+
+/// Readings of the clocks of a run.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Clocks {
+    /// Reading of the monotonic clock.
+    pub monotonic: Instant,
+    /// Time of day, as time since the beginning of 1970.
+    pub day: Duration,
 }
 
 /// Version of IP.
@@ -168,6 +198,12 @@ pub trait Bed: Send + Sync {
     /// Returns the host of the polled task, or `None` for a task without a host.
     fn host(&self) -> Option<Arc<dyn Host>>;
 
+    /// Returns the clocks of the standard library in this run, or `None` if the standard library reads the clocks of the system.
+    fn clocks(&self) -> Option<Clocks>;
+
+    /// Fills `bytes` with random numbers from the seed. Returns `false` if random numbers come from the system.
+    fn random(&self, bytes: &mut [u8]) -> bool;
+
     /// Holds the virtual time until the value is dropped, for work on another thread. Such work takes no virtual time.
     fn hold(&self) -> Box<dyn Hold>;
 }
@@ -188,12 +224,15 @@ pub struct Entered {
 /// Declares that `bed` runs on this thread until the returned guard is dropped.
 pub fn enter(bed: Arc<dyn Bed>) -> Entered {
     // Guards nest: the test bed that ran here before is in force again when the guard is dropped.
-    Entered { before: BED.with_borrow_mut(|here| here.replace(bed)) }
+    let before = BED.with_borrow_mut(|here| here.replace(bed));
+    IS_IN_BED.set(true);
+    Entered { before }
 }
 
 impl Drop for Entered {
     fn drop(&mut self) {
         let before = self.before.take();
+        IS_IN_BED.set(before.is_some());
         // The value is dropped after the borrow has ended, because destructors of a test bed may ask for the test bed.
         let left = BED.try_with(|bed| bed.replace(before));
         drop(left);
@@ -210,6 +249,5 @@ pub fn bed() -> Option<Arc<dyn Bed>> {
 /// Returns whether a test bed runs on this thread.
 #[must_use]
 pub fn is_in_bed() -> bool {
-    // Unlike in `bed`, no reference is counted, because the caller needs only the answer.
-    BED.try_with(|bed| bed.borrow().is_some()).unwrap_or_default()
+    IS_IN_BED.get()
 }

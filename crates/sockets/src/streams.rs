@@ -59,9 +59,11 @@ pub trait ByteStream: fmt::Debug + Send + Sync {
 pub trait Stream: ByteStream + Configured {
     /// Like [`ByteStream::poll_read`], but leaves the bytes in the stream.
     fn poll_peek(&self, cx: &mut Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>>;
+    /// Copies received bytes, which stay in the stream, without waiting.
+    fn try_peek(&self, buffer: &mut [u8]) -> io::Result<usize>;
     /// Returns the address of this end.
     fn local_addr(&self) -> io::Result<SocketAddr>;
-    /// Returns the address of the other end.
+    /// Returns the address of the other end. Fails while the connection is not established.
     fn peer_addr(&self) -> io::Result<SocketAddr>;
     /// Returns whether small segments leave while earlier segments are not acknowledged.
     fn nodelay(&self) -> io::Result<bool>;
@@ -86,6 +88,10 @@ pub trait Stream: ByteStream + Configured {
 pub trait Listener: Configured + fmt::Debug + Send + Sync {
     /// Accepts a connection, and returns the address of the connection's other end.
     fn poll_accept(&self, cx: &mut Context<'_>) -> Poll<io::Result<(Box<dyn Stream>, SocketAddr)>>;
+    /// Like [`Listener::poll_accept`], but returns [`io::ErrorKind::WouldBlock`] in place of waiting.
+    fn try_accept(&self) -> io::Result<(Box<dyn Stream>, SocketAddr)>;
+    /// Returns whether a connection can be accepted.
+    fn is_ready(&self) -> io::Result<bool>;
     /// Returns the address at which the listener listens.
     fn local_addr(&self) -> io::Result<SocketAddr>;
     /// Returns the time to live of packets of accepted connections.
@@ -125,6 +131,9 @@ pub trait Socket: Configured + fmt::Debug + Send + Sync {
     fn bind(&self, at: SocketAddr) -> io::Result<()>;
     /// Opens a connection.
     fn connect(self: Box<Self>, to: SocketAddr) -> Connecting;
+    /// Opens a connection without waiting. The stream can be written as soon as the connection is established or has failed, and [`ByteStream::take_error`]
+    /// then tells which.
+    fn begin(self: Box<Self>, to: SocketAddr) -> io::Result<Box<dyn Stream>>;
     /// Listens. `backlog` + 1 connections may wait to be accepted.
     fn listen(self: Box<Self>, backlog: u32) -> io::Result<Box<dyn Listener>>;
     /// Returns the socket's local address.

@@ -2,6 +2,8 @@
 
 use std::cell::RefCell;
 use std::fmt;
+use std::io;
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::task::{Context, Poll};
 
@@ -12,6 +14,19 @@ thread_local! {
 
 /// A host of a test bed, for tasks that the test bed does not poll itself.
 pub trait Host: Send + Sync {
+    /// Returns the name of the host.
+    fn name(&self) -> String;
+
+    /// Returns the addresses of `name`, a host's name or a literal address without port. May be called on every thread.
+    ///
+    /// # Errors
+    ///
+    /// [`io::ErrorKind::NotFound`] if no host has that name.
+    fn look_up(&self, name: &str, port: u16) -> io::Result<Vec<SocketAddr>>;
+
+    /// Notes a fault of the test, with which the run fails after the polled task has returned. May be called on every thread.
+    fn note_fault(&self, text: &str);
+
     /// Calls `act` as a task of this host: sockets made by `act` belong to this host.
     fn within(&self, act: &mut dyn FnMut());
 

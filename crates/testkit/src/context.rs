@@ -1,6 +1,7 @@
 //! The running test bed of the present thread: the way of programs to the state of the run.
 
 use std::cell::RefCell;
+use std::fmt;
 use std::io;
 use std::mem::ManuallyDrop;
 use std::panic::Location;
@@ -108,7 +109,17 @@ pub(crate) fn ask<T>(what: &str, question: impl FnOnce(&Arc<Shared>) -> T) -> T 
 #[derive(Clone, Copy)]
 pub(crate) struct Call {
     name: &'static str,
-    place: &'static Location<'static>,
+    /// `None` for a call of the system, whose caller is not known.
+    place: Option<&'static Location<'static>>,
+}
+
+impl fmt::Display for Call {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.place {
+            Some(place) => write!(f, "`{}` at {place}", self.name),
+            None => write!(f, "the call `{}` of the system", self.name),
+        }
+    }
 }
 
 impl Call {
@@ -119,7 +130,7 @@ impl Call {
     /// If no test bed runs on this thread.
     #[track_caller]
     pub(crate) fn here(name: &'static str) -> Self {
-        let call = Self { name, place: Location::caller() };
+        let call = Self { name, place: Some(Location::caller()) };
         if shared().is_none() {
             call.is_outside();
         }
@@ -138,8 +149,7 @@ impl Call {
         if let Some(host) = current::host() {
             return (shared, host);
         }
-        let Self { name, place } = self;
-        let text = format!("`{name}` at {place} was called by a task that belongs to no host: spawn the task with `Host::spawn`, or {how}");
+        let text = format!("{self} was called by a task that belongs to no host: spawn the task with `Host::spawn`, or {how}");
         // Tokio catches the panic of its own tasks. The noted fault fails the run nevertheless.
         shared.note_fault(&text);
         panic!("{text}");
@@ -149,7 +159,7 @@ impl Call {
     #[track_caller]
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     fn is_outside(self) -> ! {
-        panic!("`{}` at {} was called outside of a test bed: make the call within `Testbed::run`, on the thread of the run", self.name, self.place);
+        panic!("{self} was called outside of a test bed: make the call within `Testbed::run`, on the thread of the run");
     }
 }
 

@@ -125,6 +125,8 @@ mod nat;
 #[cfg(feature = "tcp")]
 pub mod net;
 pub mod node;
+#[cfg(any(feature = "facade", feature = "quinn"))]
+mod origin;
 #[cfg(feature = "quinn")]
 pub mod quinn;
 mod record;

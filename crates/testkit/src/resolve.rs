@@ -111,6 +111,11 @@ impl Found {
 
 /// Returns the addresses of a name, or of a literal address.
 fn of_name(name: &str, port: u16) -> io::Result<Found> {
+    of_name_by(name, port, look_up)
+}
+
+/// Like [`of_name`], with another function that looks up the addresses of a host, and whether the address of IPv6 comes first.
+fn of_name_by(name: &str, port: u16, look_up: impl FnOnce(&str) -> io::Result<(Addresses, bool)>) -> io::Result<Found> {
     if let Ok(address) = name.parse::<IpAddr>() {
         return Ok(Found::One((address, port).into()));
     }
@@ -211,4 +216,11 @@ fn look_up(name: &str) -> io::Result<(Addresses, bool)> {
             shared.note_call();
             io::Error::new(io::ErrorKind::NotFound, text)
         })
+}
+
+/// Returns the addresses of a name, or of a literal address, for a program on another thread than that of the run.
+#[cfg(feature = "facade")]
+pub(crate) fn elsewhere(shared: &crate::core::Shared, name: &str, port: u16) -> io::Result<Vec<SocketAddr>> {
+    let unknown = || io::Error::new(io::ErrorKind::NotFound, shared.names().unknown(name));
+    of_name_by(name, port, |name| shared.addresses(name).ok_or_else(unknown)).map(Found::all)
 }

@@ -43,6 +43,9 @@ pub(crate) struct Settings {
     pub(crate) middleboxes: Vec<Middlebox>,
     /// Hosts with several interfaces.
     pub(crate) interfaces: Vec<Interfaces>,
+    /// Parts of the system that the test bed stands in for.
+    #[cfg(feature = "facade")]
+    pub(crate) standard: Standard,
     /// Link for packets of the sender to itself; `None` if such packets arrive at once. The receiver of the link is a host without programs.
     pub(crate) loopback: Option<Path>,
 }
@@ -52,6 +55,16 @@ impl Settings {
     pub(crate) fn devices(&self) -> usize {
         self.middleboxes.len() + self.interfaces.iter().map(|interfaces| interfaces.nodes.len()).sum::<usize>()
     }
+}
+
+/// Parts of the system that a test bed stands in for, beside sockets and names.
+#[cfg(feature = "facade")]
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub(crate) struct Standard {
+    /// `true` if clocks are virtual.
+    pub(crate) clocks: bool,
+    /// `true` if random numbers come from the seed.
+    pub(crate) random: bool,
 }
 
 /// Limits of a run, beyond which the run fails.

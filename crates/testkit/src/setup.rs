@@ -57,6 +57,8 @@ impl Setup {
                 receive_buffer: RECEIVE_BUFFER,
                 addresses: BTreeMap::new(),
                 six_first: false,
+                #[cfg(feature = "facade")]
+                standard: crate::settings::Standard::default(),
                 traces: false,
                 digests: true,
                 keeps_packets: false,

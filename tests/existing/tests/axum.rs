@@ -8,6 +8,13 @@ use hyper::Request;
 use hyper_util::rt::TokioIo;
 use tokio::net::{TcpListener, TcpStream};
 
+/// Listens as the tests of axum itself do.
+async fn serve(app: Router) {
+    let listener = std::net::TcpListener::bind("0.0.0.0:80").unwrap();
+    listener.set_nonblocking(true).unwrap();
+    axum::serve(TcpListener::from_std(listener).unwrap(), app).await.unwrap();
+}
+
 #[test]
 fn requests_are_answered() {
     // Servers of hyper write the time of day into `Date`.
@@ -16,7 +23,7 @@ fn requests_are_answered() {
         async |bed| {
             bed.host("server").spawn(async {
                 let app = Router::new().route("/", get(async || "hello")).route("/length", post(async |body: Bytes| body.len().to_string()));
-                axum::serve(TcpListener::bind("0.0.0.0:80").await.unwrap(), app).await.unwrap();
+                serve(app).await;
             });
             let client = bed.host("client").spawn(async {
                 let stream = TcpStream::connect(("server", 80)).await.unwrap();

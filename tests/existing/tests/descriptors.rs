@@ -161,10 +161,26 @@ fn listeners_and_datagrams_go_through_the_standard_library() {
     });
 }
 
+/// Closing the last descriptor closes the connection, and not an earlier one.
 #[test]
-fn a_connection_whose_placeholder_is_dropped_ends_with_the_test_bed() {
-    with_echo(async |_| {
-        drop(TcpStream::connect("server:7").await.unwrap().into_std().unwrap());
-        sleep(Duration::from_secs(1)).await;
-    });
+fn a_connection_whose_placeholder_is_dropped_is_closed() {
+    let program = async |bed: Bed| {
+        bed.host("server").spawn(async {
+            let listener = TcpListener::bind("0.0.0.0:7").await.unwrap();
+            let (mut stream, _) = listener.accept().await.unwrap();
+            let begin = Instant::now();
+            assert_eq!(stream.read(&mut [0; 1]).await.unwrap(), 0);
+            assert_eq!(begin.elapsed().as_secs(), 1);
+        });
+        let client = bed.host("client").spawn(async {
+            let stream = TcpStream::connect("server:7").await.unwrap().into_std().unwrap();
+            let other = stream.try_clone().unwrap();
+            drop(stream);
+            sleep(Duration::from_secs(1)).await;
+            drop(other);
+            sleep(Duration::from_secs(1)).await;
+        });
+        client.await.unwrap();
+    };
+    Testbed::new(["client", "server"]).links("delay 10ms").on_tokio().run(program);
 }

@@ -41,6 +41,14 @@ async fn over_a_name() {
     timed("name", echo("localhost", 1)).await;
 }
 
+/// The span is taken by the clock of the standard library.
+#[tokio::test]
+async fn by_the_clock_of_the_standard_library() {
+    let begin = std::time::Instant::now();
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    println!("the clock says {} ns", begin.elapsed().as_nanos());
+}
+
 #[test]
 fn by_a_runtime() {
     Runtime::new().unwrap().block_on(timed("runtime", echo("127.0.0.1", 1)));

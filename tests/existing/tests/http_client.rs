@@ -1,4 +1,4 @@
-//! The connector of hyper-util, on which reqwest stands, and reqwest: both make their sockets with `socket2`.
+//! The connector of hyper-util, on which reqwest stands, and reqwest: both make their sockets with `socket2`, and look names up with the standard library.
 
 use std::time::Duration;
 
@@ -37,7 +37,7 @@ fn the_connector_of_hyper_util() {
                 connector.set_connect_timeout(Some(Duration::from_secs(60)));
                 let client = Client::builder(TokioExecutor::new()).build(connector);
                 for size in [1, 50_000] {
-                    let request = Request::post("http://10.0.0.2/length").body(Full::new(Bytes::from(vec![7; size]))).unwrap();
+                    let request = Request::post("http://server/length").body(Full::new(Bytes::from(vec![7; size]))).unwrap();
                     let answer = client.request(request).await.unwrap();
                     assert_eq!(answer.into_body().collect().await.unwrap().to_bytes(), size.to_string());
                 }
@@ -56,10 +56,10 @@ fn reqwest_asks_and_is_answered() {
             let client = bed.host("client").spawn(async {
                 let client = reqwest::Client::builder().tcp_keepalive(Duration::from_secs(30)).no_proxy().build().unwrap();
                 for size in [1, 50_000] {
-                    let answer = client.post("http://10.0.0.2/length").body(vec![7; size]).send().await.unwrap();
+                    let answer = client.post("http://server/length").body(vec![7; size]).send().await.unwrap();
                     assert_eq!(answer.text().await.unwrap(), size.to_string());
                 }
-                assert_eq!(client.get("http://10.0.0.2/").send().await.unwrap().text().await.unwrap(), "hello");
+                assert_eq!(client.get("http://server/").send().await.unwrap().text().await.unwrap(), "hello");
             });
             client.await.unwrap();
         },

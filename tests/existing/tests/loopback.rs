@@ -40,6 +40,19 @@ fn the_same_happens_twice_and_something_else_with_another_seed() {
     }
 }
 
+/// The suite asks for virtual clocks of the standard library.
+#[test]
+fn clocks_of_the_standard_library_follow_where_the_environment_says_so() {
+    for (words, is_virtual) in [("clocks random", true), ("", false)] {
+        let output = run("foreign::by_the_clock", &[("COHAPTIC_TEST_LOOPBACK", "delay 20ms"), ("COHAPTIC_TEST_STD", words)]);
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success() && text.contains("the clock says "), "{text}");
+        assert_eq!(text.contains("the clock says 100000000 ns"), is_virtual, "{text}");
+    }
+    let output = run("foreign::by_the_clock", &[("COHAPTIC_TEST_LOOPBACK", "delay 20ms"), ("COHAPTIC_TEST_STD", "clock")]);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("COHAPTIC_TEST_STD says `clock`: expected `clocks`, `random`"));
+}
+
 /// A test bed in the same process keeps its own network and seed.
 #[test]
 fn a_test_bed_is_not_on_the_loopback() {

@@ -55,13 +55,16 @@ fn a_socket_on_no_host() {
 
 #[test]
 fn real_sockets_that_are_bound() {
-    on_one_host(async || {
-        let real = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    // Made before the run, the sockets belong to the system.
+    let datagrams = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let client = std::net::TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+    on_one_host(async move || {
+        let real = datagrams;
         real.set_nonblocking(true).unwrap();
         let error = UdpSocket::from_std(real).unwrap_err().to_string();
         assert!(error.contains("`UdpSocket::from_std` in a test bed") && error.contains("the functions of `tokio::net`"), "{error}");
-        let real = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-        let client = std::net::TcpStream::connect(real.local_addr().unwrap()).unwrap();
+        let real = listener;
         client.set_nonblocking(true).unwrap();
         let error = TcpStream::from_std(client.try_clone().unwrap()).unwrap_err().to_string();
         assert!(error.contains("`TcpStream::from_std` in a test bed"), "{error}");

@@ -9,7 +9,7 @@ use toml::{Table, Value};
 use super::files::{Files, list};
 use super::loopback;
 use super::sources::Sources;
-use super::workspace::Workspace;
+use super::workspace::{Beside, Workspace};
 use crate::failure::Failure;
 use crate::file::read_text;
 
@@ -24,7 +24,7 @@ macro_rules! files {
 }
 
 /// Sources of the package that stands in for tokio.
-const SOURCES: [(&str, &str); 39] = files![
+const SOURCES: [(&str, &str); 38] = files![
     "hosted.rs",
     "lib.rs",
     "net/addr.rs",
@@ -35,7 +35,6 @@ const SOURCES: [(&str, &str); 39] = files![
     "net/listener.rs",
     "net/lookup.rs",
     "net/mod.rs",
-    "net/placeholder.rs",
     "net/ready.rs",
     "net/socket.rs",
     "net/stream.rs",
@@ -169,10 +168,10 @@ pub(super) fn write(workspace: &Workspace, sources: &Sources) -> Result<PathBuf,
     let manifest: Table =
         read_text(&manifest)?.parse().map_err(|error| Failure::System(format!("{} cannot be read: {error}", manifest.display())))?;
     write_real(&workspace.folder().join("real-tokio"), version, sources, &manifest)?;
-    Files::new(&workspace.folder().join("loopback")).write("Cargo.toml", &loopback::manifest(kit, &workspace.sockets))?;
+    Files::new(&workspace.folder().join("loopback")).write("Cargo.toml", &loopback::manifest(kit, &workspace.beside.sockets))?;
     let package = workspace.folder().join("tokio");
     let mut files = Files::new(&package);
-    files.write("Cargo.toml", &standing_in(version, &manifest, &workspace.sockets))?;
+    files.write("Cargo.toml", &standing_in(version, &manifest, &workspace.beside))?;
     for (path, text) in SOURCES {
         files.write(&format!("src/{path}"), &chosen(text, sources)?)?;
     }
@@ -243,7 +242,7 @@ fn chosen(text: &str, sources: &Path) -> Result<String, Failure> {
 }
 
 /// Returns the manifest of the package that stands in: the same version and the same features as the real one.
-fn standing_in(version: &str, real: &Table, sockets: &str) -> String {
+fn standing_in(version: &str, real: &Table, beside: &Beside) -> String {
     let features = real.get("features").and_then(Value::as_table).cloned().unwrap_or_default();
     let parts = |list: &Value| -> Vec<String> { list.as_array().into_iter().flatten().filter_map(Value::as_str).map(str::to_owned).collect() };
     let named: BTreeSet<String> = features.values().flat_map(parts).filter_map(|part| part.strip_prefix("dep:").map(str::to_owned)).collect();
@@ -265,6 +264,10 @@ fn standing_in(version: &str, real: &Table, sockets: &str) -> String {
                 own.push(format!("dep:{package}"));
             }
         }
+        // Descriptors are those of sockets.
+        if name == "net" {
+            own.extend(["cohaptic-descriptors", "cohaptic-libc"].map(|package| format!("dep:{package}")));
+        }
         // Only runtimes have loopbacks.
         if name == "rt" {
             own.push("dep:loopback".to_owned());
@@ -275,12 +278,14 @@ fn standing_in(version: &str, real: &Table, sockets: &str) -> String {
         let own = if ["bytes", "socket2"].contains(&&**name) { format!(", \"dep:{name}\"") } else { String::new() };
         let _ = writeln!(text, "{name} = [\"real/{name}\"{own}]");
     }
+    let Beside { sockets, descriptors, libc, catches_calls } = beside;
     let _ = write!(
         text,
         "\n[dependencies]\nbytes = {{ version = \"1\", optional = true }}\ncohaptic-sockets = {{ {sockets} }}\n\
          loopback = {{ package = \"{}\", path = \"../loopback\", default-features = false, features = [\"loopback\", \"pcapng\"], optional = true }}\n\
          real = {{ package = \"{REAL}\", path = \"../real-tokio\", default-features = false }}\nsocket2 = {{ version = \"0.6\", features = [\"all\"], optional = true \
-         }}\n\n[workspace]\n\n[lints.rust]\nwarnings = \"allow\"\n",
+         }}\n\n[target.'cfg(unix)'.dependencies]\ncohaptic-descriptors = {{ {descriptors}, optional = true }}\n\
+         cohaptic-libc = {{ {libc}, default-features = {catches_calls}, optional = true }}\n\n[workspace]\n\n[lints.rust]\nwarnings = \"allow\"\n",
         loopback::NAME
     );
     text
@@ -315,7 +320,7 @@ mod tests {
     fn features_bring_what_the_package_itself_needs() {
         for (form, expected) in [("bytes", "[\"real/io-util\", \"bytes\"]"), ("dep:bytes", "[\"real/io-util\", \"dep:bytes\"]")] {
             let real = format!("[features]\nio-util = [{form:?}]\nrt = []\n[dependencies.bytes]\nversion = \"1\"\noptional = true\n");
-            let own = standing_in("1.99.0", &real.parse().unwrap(), "path = \"sockets\"");
+            let own = standing_in("1.99.0", &real.parse().unwrap(), &Beside::default());
             assert!(own.contains(&format!("\"io-util\" = {expected}\n\"rt\" = [\"real/rt\", \"dep:loopback\"]\n")), "{own}");
             assert_eq!(own.contains("bytes = [\"real/bytes\", \"dep:bytes\"]\n"), form == "bytes", "{own}");
         }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::cargo::metadata;
 use crate::failure::Failure;
@@ -13,6 +13,9 @@ const FOLDER: &str = "target/cohaptic";
 
 /// Folder in which the workspace with the tests is looked for.
 const SIM: &str = "sim";
+
+/// Environment variable with the folder of the test kit, for workspaces that do not depend on the test kit.
+const KIT: &str = "COHAPTIC_TESTKIT";
 
 /// Minor version of the oldest tokio 1 that the package can replace.
 const OLDEST: u32 = 47;
@@ -26,8 +29,18 @@ pub(super) struct Workspace {
     sim: PathBuf,
     /// Source of the test kit, as keys of an inline table of TOML.
     pub(super) kit: String,
-    /// Source of `cohaptic-sockets`, equal to the source of the test kit, as keys of an inline table of TOML.
+    /// Sources of the packages beside the test kit on which the package `tokio` depends.
+    pub(super) beside: Beside,
+}
+
+/// Sources of packages beside the test kit, equal to the source of the test kit, as keys of an inline table of TOML.
+#[derive(Default, Debug)]
+pub(super) struct Beside {
     pub(super) sockets: String,
+    pub(super) descriptors: String,
+    pub(super) libc: String,
+    /// `true` if calls of the system are caught, by the feature `symbols` of `cohaptic-libc`.
+    pub(super) catches_calls: bool,
 }
 
 impl Workspace {
@@ -44,21 +57,26 @@ impl Workspace {
         // `cargo metadata` takes a noticeable time, so one workspace is read once.
         let tests = if sim == root { own } else { metadata(&sim, &["--no-deps"], "the workspace with the tests cannot be read")? };
         let sim = PathBuf::from(tests["workspace_root"].as_str().unwrap_or_default());
-        let Some(kit) = dependency(&tests, "cohaptic-testkit") else {
+        let named = std::env::var(KIT).ok().map(|path| json!({ "path": path, "features": ["facade"], "uses_default_features": true }));
+        let Some(kit) = dependency(&tests, "cohaptic-testkit").or(named.as_ref()) else {
             return Err(Failure::Input(format!(
                 "no package of {} depends on cohaptic-testkit: expected it among the [dev-dependencies] of the package with the tests, with features = [\"facade\"]; \
-                 --sim FOLDER names another workspace",
+                 --sim FOLDER names another workspace, and the variable {KIT} the folder of the test kit for tests that know of no test bed",
                 sim.display()
             )));
         };
-        if !kit["features"].as_array().is_some_and(|features| features.iter().any(|feature| feature == "facade")) {
+        if !has_feature(kit, "facade") {
             return Err(Failure::Input(format!(
                 "the dependency on cohaptic-testkit in {} lacks its feature `facade`: expected features = [\"facade\"]",
                 sim.display()
             )));
         }
-        let (kit, sockets) = (source(kit, ".")?, source(kit, "../sockets")?);
-        Ok(Self { root, sim, kit, sockets })
+        // The feature `libc` is a default feature of the test kit and names no code of it: features add, and calls of the system are to be caught unless somebody
+        // says no.
+        let catches_calls = kit["uses_default_features"] != false || has_feature(kit, "libc");
+        let beside =
+            Beside { sockets: source(kit, "../sockets")?, descriptors: source(kit, "../descriptors")?, libc: source(kit, "../libc")?, catches_calls };
+        Ok(Self { root, sim, kit: source(kit, ".")?, beside })
     }
 
     /// Returns the folder for all written files.
@@ -119,6 +137,10 @@ fn dependency<'a>(workspace: &'a Value, name: &str) -> Option<&'a Value> {
     packages.iter().filter_map(|package| package["dependencies"].as_array()).flatten().find(|dependency| dependency["name"] == name)
 }
 
+fn has_feature(kit: &Value, name: &str) -> bool {
+    kit["features"].as_array().is_some_and(|features| features.iter().any(|feature| feature == name))
+}
+
 /// Returns the source of a package beside the test kit, as keys of an inline table of TOML. `folder` is the path from the test kit to the package. Both come
 /// from the same source, because two copies of `cohaptic-sockets` would not know of each other.
 fn source(kit: &Value, folder: &str) -> Result<String, Failure> {
@@ -143,8 +165,6 @@ fn source(kit: &Value, folder: &str) -> Result<String, Failure> {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
-
     use super::*;
 
     #[test]
@@ -164,7 +184,7 @@ mod tests {
 
     #[test]
     fn the_path_of_the_patch_begins_in_the_workspace_with_the_tests() {
-        let workspace = |sim: &str| Workspace { root: "/code".into(), sim: sim.into(), kit: String::new(), sockets: String::new() };
+        let workspace = |sim: &str| Workspace { root: "/code".into(), sim: sim.into(), kit: String::new(), beside: Beside::default() };
         let package = Path::new("/code/target/cohaptic/tokio");
         assert_eq!(workspace("/code/sim").patch(package), "../target/cohaptic/tokio");
         assert_eq!(workspace("/code").patch(package), "target/cohaptic/tokio");

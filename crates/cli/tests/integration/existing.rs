@@ -90,6 +90,13 @@ fn the_package_has_the_version_and_the_features_of_tokio() {
     // Optional dependencies are features as well, as those of the real tokio are.
     assert!(own["features"].get("parking_lot").is_some() && own["features"].get("slab").is_none());
     assert!(own["dependencies"]["cohaptic-sockets"]["path"].as_str().unwrap().ends_with("crates/sockets"));
+    // Descriptors and calls of the system come with sockets, on Unix.
+    let unix = &own["target"]["cfg(unix)"]["dependencies"];
+    assert!(unix["cohaptic-descriptors"]["path"].as_str().unwrap().ends_with("crates/descriptors"));
+    assert_eq!(unix["cohaptic-libc"]["default-features"].as_bool(), Some(true));
+    for package in ["dep:cohaptic-descriptors", "dep:cohaptic-libc"] {
+        assert!(own["features"]["net"].as_array().unwrap().contains(&package.into()), "{package}");
+    }
 
     // An unchanged file is not written again, so that cargo does not compile it again.
     let written = || fs::metadata(desk.path("target/cohaptic/tokio/src/lib.rs")).unwrap().modified().unwrap();
@@ -102,6 +109,31 @@ fn the_package_has_the_version_and_the_features_of_tokio() {
     assert_eq!(written(), first);
     assert!(!desk.path("target/cohaptic/tokio/src/old.rs").exists());
     assert!(desk.path("target/cohaptic/tokio/Cargo.lock").exists());
+}
+
+/// Without the feature `libc` of the test kit, calls of the system reach the system.
+#[test]
+fn calls_of_the_system_are_caught_unless_the_test_kit_is_asked_not_to() {
+    for (features, expected) in [("\"facade\"", false), ("\"facade\", \"libc\"", true)] {
+        let desk = program("");
+        let manifest = desk.read("Cargo.toml").replace("features = []", &format!("default-features = false, features = [{features}]"));
+        desk.write("Cargo.toml", manifest);
+        desk.text("tokio");
+        let own: toml::Table = desk.read("target/cohaptic/tokio/Cargo.toml").parse().unwrap();
+        assert_eq!(own["target"]["cfg(unix)"]["dependencies"]["cohaptic-libc"]["default-features"].as_bool(), Some(expected), "{features}");
+    }
+}
+
+/// A suite that knows of no test bed does not depend on the test kit.
+#[test]
+fn the_test_kit_may_be_named_by_a_variable() {
+    let desk = program("\"facade\"");
+    let (without, _) = desk.read("Cargo.toml").split_once("[dev-dependencies]").map(|(before, after)| (before.to_owned(), after.to_owned())).unwrap();
+    desk.write("Cargo.toml", format!("{without}[workspace]\n"));
+    desk.cohaptic("tokio").assert_refused(2, &["no package of", "the variable COHAPTIC_TESTKIT the folder of the test kit"]);
+    let kit = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testkit");
+    let outcome = Outcome::of(desk.command("tokio").env("COHAPTIC_TESTKIT", kit).output().unwrap());
+    assert!(outcome.stdout.starts_with(&format!("tokio {} for tests: ", version())), "{outcome:?}");
 }
 
 #[test]

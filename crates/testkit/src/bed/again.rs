@@ -33,13 +33,17 @@ impl Testbed {
             (!self.setup.changes.is_empty()).then(|| "// The changes of links stand in the file of the test.".to_owned()),
             is_tokio.then(|| ".on_tokio()".to_owned()),
         ];
+        #[cfg(feature = "facade")]
+        let standard = self.standard_calls();
+        #[cfg(not(feature = "facade"))]
+        let standard = std::iter::empty();
         Again {
             names: Arc::clone(&self.setup.names),
             hosts: self.setup.hosts(),
             said: Arc::clone(said),
             laws: laws.clone(),
             seed: seed.clone(),
-            others: self.address_calls().chain(others.into_iter().flatten()).collect(),
+            others: self.address_calls().chain(others.into_iter().flatten()).chain(standard).collect(),
             place,
         }
     }

@@ -19,7 +19,7 @@ const LOOPBACK: &str = "loopback";
 impl Testbed {
     /// Creates a test bed of one host. The packets of the host to itself take the link.
     pub(crate) fn of_loopback(link: impl ToLink) -> Self {
-        let mut bed = Self::new([HOST, LOOPBACK]).link(HOST, LOOPBACK, link).on_tokio();
+        let mut bed = Self::new([HOST, LOOPBACK]).link(HOST, LOOPBACK, link).on_tokio().with_standard_of_environment();
         bed.setup.settings.loopback = Some(bed.setup.names.path(HOST, LOOPBACK));
         bed
     }

@@ -9,6 +9,8 @@ mod nat;
 #[cfg(feature = "strategies")]
 mod network;
 mod running;
+#[cfg(feature = "facade")]
+mod standard;
 #[cfg(feature = "tcp")]
 mod tcp;
 

@@ -6,7 +6,7 @@ use cohaptic_wan::NodeId;
 use cohaptic_wan::random::{Purpose, Stream};
 
 /// Label of the random streams of programs. The labels of links differ: see [`cohaptic_wan::LinkName`].
-#[cfg(any(test, feature = "quinn"))]
+#[cfg(any(test, feature = "facade", feature = "quinn"))]
 const LABEL: &[u8] = b"entropy of the programs of a test bed";
 
 /// Source of the random bytes of one host.
@@ -51,7 +51,7 @@ pub(crate) struct ByHost {
 }
 
 impl ByHost {
-    #[cfg(feature = "quinn")]
+    #[cfg(any(feature = "facade", feature = "quinn"))]
     pub(super) const fn of_programs(seed: u64) -> Self {
         Self::labelled(seed, LABEL)
     }

@@ -1,10 +1,15 @@
 //! Part of the state that is read without the lock of the state: the time, and the number of calls at the present instant.
 
 use std::sync::atomic::{AtomicU64, Ordering};
+#[cfg(feature = "facade")]
+use std::sync::{Mutex, PoisonError};
 
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
 
+use crate::address::AddressPlan;
+#[cfg(feature = "facade")]
+use crate::address::Addresses;
 use crate::current;
 
 /// The time of the run, and the number of calls since time last passed. Only the holder of the state writes the time. Two threads may count a call at once and
@@ -23,10 +28,15 @@ pub(crate) struct Face {
     patience: u64,
     /// Limit of `calls`: ten times the patience.
     most_calls: u64,
+    /// Addresses of the hosts, for programs that look names up on other threads.
+    #[cfg(feature = "facade")]
+    plan: Mutex<AddressPlan>,
 }
 
 impl Face {
-    pub(super) const fn new(patience: u64) -> Self {
+    pub(super) fn new(patience: u64, plan: &AddressPlan) -> Self {
+        #[cfg(not(feature = "facade"))]
+        let _ = plan;
         Self {
             now: AtomicU64::new(0),
             calls: AtomicU64::new(0),
@@ -35,7 +45,21 @@ impl Face {
             #[cfg(feature = "tokio")]
             patience,
             most_calls: patience.saturating_mul(10),
+            #[cfg(feature = "facade")]
+            plan: Mutex::new(plan.clone()),
         }
+    }
+
+    /// Shows the changed addresses of the hosts.
+    #[cfg(feature = "facade")]
+    pub(super) fn publish(&self, plan: &AddressPlan) {
+        plan.clone_into(&mut self.plan.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
+    /// Returns the addresses of the host named `name`. Every thread may ask.
+    #[cfg(feature = "facade")]
+    pub(crate) fn addresses(&self, name: &str) -> Option<Addresses> {
+        self.plan.lock().unwrap_or_else(PoisonError::into_inner).addresses(name)
     }
 
     #[inline]

@@ -61,7 +61,7 @@ pub(crate) struct Core {
     pub(crate) settings: Settings,
     pub(crate) wire: Wire<Ends>,
     pub(crate) timers: Timers,
-    #[cfg(feature = "quinn")]
+    #[cfg(any(feature = "facade", feature = "quinn"))]
     entropy: entropy::ByHost,
     hosts: Vec<HostState>,
     sockets: Sockets,
@@ -95,13 +95,13 @@ impl Core {
         let mut plan = AddressPlan::new(Arc::clone(names), &addresses);
         settings.interfaces.iter().for_each(|interfaces| plan.add_interfaces(interfaces.host, &interfaces.nodes));
         Self {
-            plan,
             forwarding: Forwarding::new(&settings, topology, names, seed),
             wire: Wire::new(names, seed, &settings, changes, link),
-            face: Arc::new(Face::new(settings.patience)),
+            face: Arc::new(Face::new(settings.patience, &plan)),
+            plan,
             settings,
             timers: Timers::default(),
-            #[cfg(feature = "quinn")]
+            #[cfg(any(feature = "facade", feature = "quinn"))]
             entropy: entropy::ByHost::of_programs(seed),
             hosts: names.iter().map(|_| HostState::default()).collect(),
             sockets: Sockets::default(),
@@ -203,7 +203,7 @@ impl Core {
     }
 
     /// Returns the source of random bytes for the programs of `host`, or for programs of no host.
-    #[cfg(feature = "quinn")]
+    #[cfg(any(feature = "facade", feature = "quinn"))]
     pub(crate) fn entropy(&mut self, host: Option<NodeId>) -> &mut entropy::Entropy {
         self.entropy.of(host, self.plan.names())
     }
@@ -212,7 +212,7 @@ impl Core {
     pub(crate) fn recorded(&self) -> Recorded {
         let mut recorded = self.wire.recorded();
         recorded.drawn.has_drawn |= self.forwarding.as_ref().is_some_and(|forwarding| forwarding.has_drawn());
-        #[cfg(feature = "quinn")]
+        #[cfg(any(feature = "facade", feature = "quinn"))]
         let () = recorded.drawn.has_drawn |= self.entropy.was_asked();
         #[cfg(feature = "tcp")]
         let () = recorded.drawn.has_drawn |= self.tcp.has_drawn();
@@ -311,13 +311,18 @@ impl Core {
         self.wire.note(Happening::Readdressed(host));
         let uplink = self.plan.uplink(host);
         let inside = self.forwarding.as_mut().and_then(|forwarding| forwarding.topology_mut().fresh(uplink));
-        self.plan.change(host, inside)
+        let addresses = self.plan.change(host, inside);
+        #[cfg(feature = "facade")]
+        self.face.publish(&self.plan);
+        addresses
     }
 
     /// Makes an interface the uplink of its host, and returns the addresses that the host has now.
     pub(crate) fn set_uplink(&mut self, host: NodeId, node: NodeId) -> address::Addresses {
         self.wire.note(Happening::Readdressed(host));
         self.plan.set_uplink(host, node);
+        #[cfg(feature = "facade")]
+        self.face.publish(&self.plan);
         self.plan.of(host)
     }
 }

@@ -48,6 +48,12 @@ pub(crate) struct Shared {
     is_synced: AtomicBool,
     clock: Clock,
     face: Arc<Face>,
+    /// `true` if the address of IPv6 comes first when a name is looked up.
+    #[cfg(feature = "facade")]
+    six_first: bool,
+    /// Parts of the system that the test bed stands in for.
+    #[cfg(feature = "facade")]
+    pub(crate) standard: crate::settings::Standard,
     /// Number of pieces of work on other threads during which time does not pass.
     #[cfg(feature = "facade")]
     pub(super) holds: Arc<std::sync::atomic::AtomicUsize>,
@@ -70,6 +76,8 @@ impl Shared {
         static RUNS: AtomicU64 = AtomicU64::new(1);
         let run = RUNS.fetch_add(1, Ordering::Relaxed);
         let (face, stays, names) = (Arc::clone(&core.face), core.is_looked_at(), Arc::clone(core.plan.shared_names()));
+        #[cfg(feature = "facade")]
+        let (six_first, standard) = (core.settings.six_first, core.settings.standard);
         Self {
             home: Mutex::new(Some(Box::new(Core { run, ..core }))),
             elsewhere: Elsewhere::default(),
@@ -82,7 +90,32 @@ impl Shared {
             clock,
             face,
             #[cfg(feature = "facade")]
+            six_first,
+            #[cfg(feature = "facade")]
+            standard,
+            #[cfg(feature = "facade")]
             holds: Arc::default(),
+        }
+    }
+
+    /// Returns the addresses of the host named `name`, and whether the address of IPv6 comes first. Every thread may ask.
+    #[cfg(feature = "facade")]
+    pub(crate) fn addresses(&self, name: &str) -> Option<(crate::address::Addresses, bool)> {
+        self.face.addresses(name).map(|addresses| (addresses, self.six_first))
+    }
+
+    /// Returns the time of the run, also while the state answers on this thread: then the time is that of the state.
+    #[cfg(feature = "facade")]
+    pub(crate) fn any_now(&self) -> Instant {
+        if self.is_synced() { self.face.now() } else { self.try_with(|core| core.now()).unwrap_or_else(|| self.face.now()) }
+    }
+
+    /// Returns the reading of the monotonic clock that stands for [`Instant::ZERO`].
+    #[cfg(feature = "facade")]
+    pub(crate) fn origin(&self) -> std::time::Instant {
+        match self.clock {
+            Clock::Own => crate::origin::base(),
+            Clock::Tokio { origin } => origin.into_std(),
         }
     }
 

@@ -24,9 +24,15 @@ impl Parcel {
     }
 
     /// Returns the address to which the datagram was sent.
-    #[cfg(feature = "quinn")]
+    #[cfg(any(feature = "facade", feature = "quinn"))]
     pub(crate) fn to(&self) -> std::net::IpAddr {
         self.addresses.to().ip()
+    }
+
+    /// Returns the ECN codepoint on arrival.
+    #[cfg(any(feature = "facade", feature = "quinn"))]
+    pub(crate) const fn codepoint(&self) -> cohaptic_units::Ecn {
+        if self.arrival.marked { cohaptic_units::Ecn::Congestion } else { self.ecn }
     }
 
     /// Copies the datagram into `buffer`, cut to the length of the buffer. Returns the number of bytes copied.

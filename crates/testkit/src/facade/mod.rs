@@ -3,6 +3,7 @@
 //! `cohaptic tokio` writes the package. Programs with tokio's sockets and tasks then run on a test bed unchanged: the package asks `cohaptic-sockets` for the
 //! test bed of the thread, and `crate::runtime` registers the test bed of each run.
 
+mod host;
 mod settings;
 mod unix;
 
@@ -11,15 +12,18 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 
 use cohaptic_sockets::{
-    Bed, ByteStream, Call, Connecting, Datagrams, Hold, Host, Listener, Socket, Stream, UnixDatagrams, UnixSocket, UnixStream, Version,
+    Bed, ByteStream, Call, Clocks, Connecting, Datagrams, Hold, Host, Listener, Socket, Stream, UnixDatagrams, UnixSocket, UnixStream, Version,
 };
+
+use cohaptic_units::Instant;
 
 use crate::context;
 use crate::core::Shared;
 use crate::current;
+use crate::origin;
 use crate::resolve::ToSocketAddrs;
 use crate::socket::UdpSocket;
-use crate::task::{Kept, OtherTasks};
+use crate::task::OtherTasks;
 use crate::tcp::socket::TcpSocket;
 use crate::tcp::{TcpListener, TcpStream};
 
@@ -95,7 +99,20 @@ impl Bed for BedOfThread {
 
     fn host(&self) -> Option<Arc<dyn Host>> {
         let host = current::host()?;
-        Some(Arc::new(Kept { host, others: Arc::clone(&self.others) }))
+        Some(Arc::new(host::OfBed { host, shared: Arc::clone(&self.shared), others: Arc::clone(&self.others) }))
+    }
+
+    fn clocks(&self) -> Option<Clocks> {
+        if !self.shared.standard.clocks {
+            return None;
+        }
+        let passed = self.shared.any_now().saturating_duration_since(Instant::ZERO);
+        Some(Clocks { monotonic: self.shared.origin() + passed, day: origin::DAY + passed })
+    }
+
+    fn random(&self, bytes: &mut [u8]) -> bool {
+        // A state that answers now cannot be asked, and the program gets numbers of the system, as before the run.
+        self.shared.standard.random && self.shared.try_with(|core| core.entropy(current::host()).fill(bytes)).is_some()
     }
 
     fn hold(&self) -> Box<dyn Hold> {

@@ -82,8 +82,7 @@ impl AsyncUdpSocket for VirtualSocket {
 /// Copies a datagram, cut to the length of the buffer, and returns its description.
 fn fill(buffer: &mut [u8], datagram: &Parcel) -> RecvMeta {
     let len = datagram.copy_to(buffer);
-    let ecn = if datagram.arrival.marked { Some(EcnCodepoint::Ce) } else { EcnCodepoint::from_bits(datagram.ecn.bits()) };
-    RecvMeta { addr: datagram.from(), len, stride: len, ecn, dst_ip: Some(datagram.to()) }
+    RecvMeta { addr: datagram.from(), len, stride: len, ecn: EcnCodepoint::from_bits(datagram.codepoint().bits()), dst_ip: Some(datagram.to()) }
 }
 
 /// Returns the codepoint of a datagram of quinn.

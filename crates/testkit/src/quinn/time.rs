@@ -1,6 +1,5 @@
 //! Conversions of virtual time to the monotonic clock and to the time of day.
 
-use std::sync::OnceLock;
 use std::time::{Duration, Instant as StdInstant, SystemTime, UNIX_EPOCH};
 
 use ::quinn::TimeSource;
@@ -9,19 +8,7 @@ use ::quinn::rustls::time_provider::TimeProvider;
 use cohaptic_units::Instant;
 
 use crate::context;
-
-/// Time of day at the beginning of every run: the first of January 2027, 0:00 UTC \[s since 1970\].
-const DAY: u64 = 1_798_761_600;
-
-/// Returns the instant that stands for [`Instant::ZERO`] on quinn's clock.
-///
-/// An instant of the standard library can only be made from the clock. The choice has no visible effect: quinn takes differences of instants and compares
-/// instants, and all instants of quinn are sums of this instant and virtual time.
-#[expect(clippy::disallowed_methods, reason = "there is no other way to an `Instant`; only differences to it are used")]
-fn base() -> StdInstant {
-    static BASE: OnceLock<StdInstant> = OnceLock::new();
-    *BASE.get_or_init(StdInstant::now)
-}
+use crate::origin::{DAY, base};
 
 /// Converts virtual time to quinn's clock.
 pub(super) fn to_std(at: Instant) -> StdInstant {
@@ -42,7 +29,7 @@ pub struct TestTime;
 impl TestTime {
     fn since_1970() -> Option<Duration> {
         let now = context::shared()?.with(|core| core.now());
-        Some(Duration::from_secs(DAY) + now.saturating_duration_since(Instant::ZERO))
+        Some(DAY + now.saturating_duration_since(Instant::ZERO))
     }
 }
 
@@ -54,7 +41,7 @@ impl TimeProvider for TestTime {
 
 impl TimeSource for TestTime {
     fn now(&self) -> SystemTime {
-        UNIX_EPOCH + Self::since_1970().unwrap_or(Duration::from_secs(DAY))
+        UNIX_EPOCH + Self::since_1970().unwrap_or(DAY)
     }
 }
 
@@ -68,12 +55,5 @@ mod tests {
             let at = Instant::from_nanos(nanos);
             assert_eq!(from_std(to_std(at)), at);
         }
-    }
-
-    /// `date -u -d @1798761600`.
-    #[test]
-    fn the_day_is_the_first_of_2027() {
-        // From 1970 to 2027 there are 57 years, 14 of them leap years: 1972 to 2024.
-        assert_eq!(DAY, (57 * 365 + 14) * 86_400);
     }
 }

@@ -4,20 +4,21 @@ use std::io;
 use std::net::SocketAddr;
 use std::task::{Context, Poll};
 
-use cohaptic_sockets::{DatagramOption, Datagrams, Membership};
+use cohaptic_sockets::{DatagramOption, Datagrams, Membership, Received, Sending};
 use cohaptic_units::Ecn;
 
 use super::{KIND, UdpSocket};
 use crate::core::Parcel;
+use crate::errno::Errno;
 
 impl Datagrams for UdpSocket {
-    fn poll_receive(&self, cx: &mut Context<'_>, peek: bool, take: &mut dyn FnMut(&[u8], SocketAddr)) -> Poll<io::Result<()>> {
-        let look = |datagram: &Parcel| take(&datagram.bytes, datagram.from());
+    fn poll_receive(&self, cx: &mut Context<'_>, peek: bool, take: &mut dyn FnMut(Received<'_>)) -> Poll<io::Result<()>> {
+        let look = |datagram: &Parcel| take(received(datagram));
         if peek { self.poll_look::<true, _>(cx, look) } else { self.poll_look::<false, _>(cx, look) }
     }
 
-    fn try_receive(&self, peek: bool, take: &mut dyn FnMut(&[u8], SocketAddr)) -> io::Result<()> {
-        let look = |datagram: &Parcel| take(&datagram.bytes, datagram.from());
+    fn try_receive(&self, peek: bool, take: &mut dyn FnMut(Received<'_>)) -> io::Result<()> {
+        let look = |datagram: &Parcel| take(received(datagram));
         if peek { self.try_look::<true, _>(look) } else { self.try_look::<false, _>(look) }
     }
 
@@ -29,8 +30,15 @@ impl Datagrams for UdpSocket {
         self.shared.open(self.host, KIND, |core| core.is_readable(self.id))
     }
 
-    fn send(&self, bytes: &[u8], to: Option<SocketAddr>) -> io::Result<usize> {
-        self.send_now(to.as_ref(), bytes, Ecn::NotCapable)
+    fn send_as(&self, bytes: &[u8], sending: Sending) -> io::Result<usize> {
+        // A socket of IPv6 names an address of IPv4 as `::ffff:10.0.0.1`.
+        if let Some(from) = sending.from.map(|from| from.to_canonical()).filter(|from| !from.is_loopback() && !from.is_unspecified()) {
+            let is_own = self.open(|core| core.plan.of(self.host).has(from))?;
+            if !is_own {
+                return Errno::InvalidInput.fail();
+            }
+        }
+        self.send_now(sending.to.as_ref(), bytes, Ecn::from_bits(sending.ecn))
     }
 
     fn connect(&self, to: SocketAddr) -> io::Result<()> {
@@ -81,4 +89,8 @@ impl Datagrams for UdpSocket {
             Membership::Leave6 { group, interface } => self.leave_multicast_v6(&group, interface),
         }
     }
+}
+
+fn received(datagram: &Parcel) -> Received<'_> {
+    Received { bytes: &datagram.bytes, from: datagram.from(), to: datagram.to(), ecn: datagram.codepoint().bits() }
 }

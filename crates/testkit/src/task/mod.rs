@@ -17,7 +17,7 @@ use std::task::{Context, Poll, Waker};
 pub(crate) use join::joined;
 pub use join::{JoinHandle, TaskStopped};
 #[cfg(feature = "facade")]
-pub(crate) use others::{Kept, OtherTasks};
+pub(crate) use others::OtherTasks;
 
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;

@@ -1,12 +1,11 @@
 //! Tasks of tokio that live on hosts. Tokio polls these tasks, and the test bed stops the tasks of a host with the host.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
-use cohaptic_sockets::{Host, Signals, Stop};
+use cohaptic_sockets::Stop;
 use cohaptic_wan::NodeId;
 
 use super::signals::Handlers;
-use crate::current;
 
 /// Handles for stopping tokio's tasks of the hosts of a run, and the signals for which the programs of the hosts listen.
 #[derive(Default)]
@@ -16,7 +15,7 @@ pub(crate) struct OtherTasks {
 }
 
 impl OtherTasks {
-    fn keep(&self, host: NodeId, stop: Box<dyn Stop>) {
+    pub(crate) fn keep(&self, host: NodeId, stop: Box<dyn Stop>) {
         let mut kept = self.stops.lock().unwrap_or_else(PoisonError::into_inner);
         // Tasks that are over are forgotten whenever the array is full, so that the array stays proportional to the number of live tasks.
         if kept.len() == kept.capacity() {
@@ -34,25 +33,5 @@ impl OtherTasks {
             kept.extract_if(.., |(of, _)| *of == host).map(|(_, stop)| stop).collect()
         };
         of_host.iter().for_each(|stop| stop.stop());
-    }
-}
-
-/// A host for tasks that tokio polls.
-pub(crate) struct Kept {
-    pub(crate) host: NodeId,
-    pub(crate) others: Arc<OtherTasks>,
-}
-
-impl Host for Kept {
-    fn within(&self, act: &mut dyn FnMut()) {
-        current::on_host(Some(self.host), act);
-    }
-
-    fn keep(&self, stop: Box<dyn Stop>) {
-        self.others.keep(self.host, stop);
-    }
-
-    fn listen_for(&self, number: i32) -> Box<dyn Signals> {
-        Box::new(self.others.signals.listen(self.host, number))
     }
 }

@@ -27,7 +27,7 @@ struct Waiting {
 
 impl Handlers {
     /// Listens for a signal on a host.
-    pub(super) fn listen(&self, host: NodeId, number: i32) -> Listener {
+    pub(crate) fn listen(&self, host: NodeId, number: i32) -> Listener {
         let waiting = Arc::default();
         let mut handlers = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let place = handlers.iter().position(|handler| (handler.host, handler.number) == (host, number)).unwrap_or_else(|| {
@@ -68,7 +68,7 @@ impl Handlers {
 
 /// Listener of a program for a signal.
 #[derive(Debug)]
-pub(super) struct Listener(Arc<Mutex<Waiting>>);
+pub(crate) struct Listener(Arc<Mutex<Waiting>>);
 
 impl Signals for Listener {
     fn poll_receive(&mut self, cx: &mut Context<'_>) -> Poll<()> {

@@ -60,6 +60,10 @@ impl Stream for TcpStream {
         self.poll_peek_into(cx, buffer)
     }
 
+    fn try_peek(&self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.open(|core| core.peek_connection(self.id, buffer))?
+    }
+
     fn local_addr(&self) -> io::Result<SocketAddr> {
         Self::local_addr(self)
     }
@@ -106,6 +110,15 @@ impl Listener for TcpListener {
         Self::poll_accept(self, cx).map_ok(|(stream, peer)| (Box::new(stream) as Box<dyn Stream>, peer))
     }
 
+    fn try_accept(&self) -> io::Result<(Box<dyn Stream>, SocketAddr)> {
+        let accepted = self.take_waiting()?.ok_or(io::ErrorKind::WouldBlock)?;
+        Ok((Box::new(accepted.0), accepted.1))
+    }
+
+    fn is_ready(&self) -> io::Result<bool> {
+        self.has_waiting()
+    }
+
     fn local_addr(&self) -> io::Result<SocketAddr> {
         Self::local_addr(self)
     }
@@ -126,6 +139,10 @@ impl Socket for TcpSocket {
 
     fn connect(self: Box<Self>, to: SocketAddr) -> Connecting {
         Box::pin(async move { Ok(Box::new(Self::connect(*self, to).await?) as Box<dyn Stream>) })
+    }
+
+    fn begin(self: Box<Self>, to: SocketAddr) -> io::Result<Box<dyn Stream>> {
+        Ok(Box::new(self.begin_to(to)?))
     }
 
     fn listen(self: Box<Self>, backlog: u32) -> io::Result<Box<dyn Listener>> {

@@ -110,17 +110,25 @@ impl TcpListener {
     ///
     /// As [`TcpListener::accept`].
     pub fn poll_accept(&self, cx: &mut Context<'_>) -> Poll<io::Result<(TcpStream, SocketAddr)>> {
-        let accepted = self.shared.open(self.host, KIND, |core| {
-            let accepted = core.accept(self.id);
-            if matches!(accepted, Ok(None)) {
-                core.wait_to_accept(self.id, cx.waker());
+        match self.take_waiting()? {
+            Some(accepted) => Poll::Ready(Ok(accepted)),
+            None => {
+                self.open(|core| core.wait_to_accept(self.id, cx.waker()))?;
+                Poll::Pending
             }
-            accepted
-        })??;
-        match accepted {
-            Some((id, peer)) => Poll::Ready(Ok((TcpStream::new(Arc::clone(&self.shared), self.host, id), peer))),
-            None => Poll::Pending,
         }
+    }
+
+    /// Accepts a connection. Returns `None` if no connection waits.
+    pub(super) fn take_waiting(&self) -> io::Result<Option<(TcpStream, SocketAddr)>> {
+        let accepted = self.shared.open(self.host, KIND, |core| core.accept(self.id))??;
+        Ok(accepted.map(|(id, peer)| (TcpStream::new(Arc::clone(&self.shared), self.host, id), peer)))
+    }
+
+    /// Returns whether a connection waits to be accepted.
+    #[cfg(feature = "facade")]
+    pub(super) fn has_waiting(&self) -> io::Result<bool> {
+        self.open(|core| core.has_waiting(self.id))
     }
 
     /// Returns the address at which the listener listens.

@@ -139,6 +139,11 @@ impl TcpSocket {
     ///
     /// As [`TcpStream::connect`]; the error of the system (`EAFNOSUPPORT`) if the address is of the other version of IP.
     pub async fn connect(self, address: SocketAddr) -> io::Result<TcpStream> {
+        self.begin_to(address)?.established().await
+    }
+
+    /// Sends the SYN. Returns the stream before the connection is established.
+    pub(super) fn begin_to(&self, address: SocketAddr) -> io::Result<TcpStream> {
         if address.is_ipv6() != self.is_six {
             return Self::of_other_version(self.is_six).fail();
         }
@@ -146,15 +151,12 @@ impl TcpSocket {
         if self.settings().is_only_six && unmapped(address).is_ipv4() {
             return Errno::NetworkUnreachable.fail();
         }
-        let stream = {
-            let mut settings = self.settings();
-            let stream = TcpStream::connect_on(Arc::clone(&self.shared), self.host, settings.bound, address, settings.config.clone())?;
-            // The port belongs to the connection now, so dropping the socket must not release it.
-            settings.bound = None;
-            stream.set_linger(settings.linger)?;
-            stream
-        };
-        stream.established().await
+        let mut settings = self.settings();
+        let stream = TcpStream::connect_on(Arc::clone(&self.shared), self.host, settings.bound, address, settings.config.clone())?;
+        // The port belongs to the connection now, so dropping the socket must not release it.
+        settings.bound = None;
+        stream.set_linger(settings.linger)?;
+        Ok(stream)
     }
 
     /// Listens. As with Linux, `backlog` + 1 connections may wait to be accepted. A socket that is not bound gets a free port.

@@ -79,7 +79,7 @@ fn datagrams_and_options_arrive() {
             assert_eq!(socket.option(DatagramOption::Ttl).unwrap(), 7);
             socket.send(b"question", Some(here().look_up("server", 7).unwrap()[0])).unwrap();
             let mut said = Vec::new();
-            poll_fn(|cx| socket.poll_receive(cx, false, &mut |bytes, _| said = bytes.to_vec())).await.unwrap();
+            poll_fn(|cx| socket.poll_receive(cx, false, &mut |datagram| said = datagram.bytes.to_vec())).await.unwrap();
             assert_eq!(said, b"answer");
         });
         let (_, from) = server.recv_from(&mut [0; 8]).await.unwrap();
@@ -192,10 +192,10 @@ fn a_datagram_that_is_looked_at_stays() {
             socket.send(b"itself", Some(socket.local_addr().unwrap())).unwrap();
             for peek in [true, true, false] {
                 let mut said = Vec::new();
-                socket.try_receive(peek, &mut |bytes, _| said = bytes.to_vec()).unwrap();
+                socket.try_receive(peek, &mut |datagram| said = datagram.bytes.to_vec()).unwrap();
                 assert_eq!(said, b"itself");
             }
-            assert_eq!(socket.try_receive(false, &mut |_, _| ()).unwrap_err().kind(), std::io::ErrorKind::WouldBlock);
+            assert_eq!(socket.try_receive(false, &mut |_| ()).unwrap_err().kind(), std::io::ErrorKind::WouldBlock);
         });
         both.await.unwrap();
     });

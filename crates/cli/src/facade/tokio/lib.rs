@@ -6,6 +6,10 @@
 
 pub use real::*;
 
+// Linked for its functions, which stand in for those of the C library.
+#[cfg(all(unix, feature = "net"))]
+use cohaptic_libc as _;
+
 #[cfg(feature = "rt")]
 mod hosted;
 pub mod net;

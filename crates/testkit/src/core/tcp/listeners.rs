@@ -155,6 +155,12 @@ impl Core {
         Ok(Some((conn, end.shown(end.machine.peer_addr()))))
     }
 
+    /// Returns whether a connection waits to be accepted.
+    #[cfg(feature = "facade")]
+    pub(crate) fn has_waiting(&self, id: ListenId) -> bool {
+        !self.tcp.listeners.get(id.0).waiting.is_empty()
+    }
+
     /// Registers a task that waits for a connection to accept.
     pub(crate) fn wait_to_accept(&mut self, id: ListenId, waker: &Waker) {
         self.tcp.listeners.get_mut(id.0).wakers.wait(waker);

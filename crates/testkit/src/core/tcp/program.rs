@@ -187,6 +187,10 @@ impl Core {
     pub(crate) fn take_error_of(&mut self, id: ConnId) -> io::Result<Option<io::Error>> {
         self.check_connection(id)?;
         let end = self.tcp.end_mut(id);
+        // A connection to an address of nobody has ended without an error of TCP. The error is reported once.
+        if end.machine.state() == State::Closed && end.unreachable_at.take().is_some() {
+            return Ok(Some(Errno::HostUnreachable.into()));
+        }
         let error = end.machine.take_error();
         Ok(error.map(|error| end.explain(error)))
     }

@@ -11,7 +11,7 @@ pub(crate) struct BedSocket<P> {
     socket: P,
     /// Made when a program first asks for a descriptor.
     #[cfg(unix)]
-    placeholder: std::sync::OnceLock<super::placeholder::Placeholder>,
+    placeholder: std::sync::OnceLock<cohaptic_descriptors::Placeholder>,
 }
 
 impl<P> BedSocket<P> {
@@ -69,10 +69,17 @@ mod with_placeholder {
     use std::io;
     use std::os::fd::{BorrowedFd, OwnedFd};
 
+    use cohaptic_descriptors::{Placeholder, Pointer, keep};
     use socket2::Type;
 
-    use super::super::placeholder::{self, Placeholder, Pointer};
     use super::*;
+
+    impl<T: ?Sized> BedSocket<Arc<T>> {
+        /// Returns the socket with its placeholder.
+        pub(in super::super) fn with(socket: Arc<T>, placeholder: Placeholder) -> Self {
+            Self { socket, placeholder: placeholder.into() }
+        }
+    }
 
     impl<P: Pointer> BedSocket<P>
     where
@@ -97,7 +104,7 @@ mod with_placeholder {
                 Some(made) => made,
                 None => Placeholder::new(kind, &*socket)?,
             };
-            placeholder::keep(made, socket)
+            keep(made, socket)
         }
     }
 }

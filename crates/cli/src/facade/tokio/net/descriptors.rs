@@ -1,19 +1,16 @@
-//! Descriptors. A socket of a test bed gives the descriptor of its placeholder: see `placeholder`.
+//! Descriptors. A socket of a test bed gives the descriptor of its placeholder: see `cohaptic-descriptors`.
 
 use std::io;
 
-#[cfg(unix)]
 use super::bed_socket::BedSocket;
-#[cfg(unix)]
-use super::placeholder::{self, Pointer};
 
 /// Returns the error of a conversion between real sockets and sockets of a test bed.
 pub(super) fn refused(what: &str) -> io::Error {
     io::Error::new(
         io::ErrorKind::Unsupported,
         format!(
-            "`{what}` in a test bed: this socket belongs to the system, since it is bound or connected, or was made by the standard library. Make the socket \
-             with the functions of `tokio::net`, or give `TcpSocket::from_std_stream` a new socket and bind it afterwards"
+            "`{what}` in a test bed: this socket belongs to the system, since it was bound or connected before the run, on another thread, or where \
+             calls of the standard library are not caught. Make the socket with the functions of `tokio::net`, or give `TcpSocket::from_std_stream` a new socket and bind it afterwards"
         ),
     )
 }
@@ -26,15 +23,16 @@ pub(super) fn refuse_real(what: &str) -> io::Result<()> {
 /// Returns the socket of a test bed for which the socket `real` stands.
 #[cfg(unix)]
 #[track_caller]
-pub(super) fn from_placeholder<T>(real: &impl std::os::fd::AsFd, what: &str) -> io::Result<std::sync::Arc<T>>
+pub(super) fn from_placeholder<T>(real: impl Into<std::os::fd::OwnedFd>, what: &str) -> io::Result<BedSocket<std::sync::Arc<T>>>
 where
-    T: cohaptic_sockets::Configured + ?Sized + 'static,
+    T: cohaptic_descriptors::Kind + ?Sized,
 {
-    placeholder::find(real.as_fd())?.ok_or_else(|| refused(what))
+    let (socket, placeholder) = cohaptic_descriptors::find(real.into())?.ok_or_else(|| refused(what))?;
+    Ok(BedSocket::with(socket, placeholder))
 }
 
 #[cfg(not(unix))]
-pub(super) fn from_placeholder<T: ?Sized>(_: &impl Sized, what: &str) -> io::Result<std::sync::Arc<T>> {
+pub(super) fn from_placeholder<T: ?Sized>(_: impl Sized, what: &str) -> io::Result<BedSocket<std::sync::Arc<T>>> {
     Err(refused(what))
 }
 
@@ -42,7 +40,7 @@ pub(super) fn from_placeholder<T: ?Sized>(_: &impl Sized, what: &str) -> io::Res
 #[cfg(unix)]
 pub(super) fn into_placeholder<P, S>(socket: BedSocket<P>, kind: socket2::Type, _: &str) -> io::Result<S>
 where
-    P: Pointer,
+    P: cohaptic_descriptors::Pointer,
     P::Target: cohaptic_sockets::Configured,
     S: From<std::os::fd::OwnedFd>,
 {

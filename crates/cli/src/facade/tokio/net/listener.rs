@@ -60,7 +60,7 @@ impl TcpListener {
     #[track_caller]
     pub fn from_std(listener: std::net::TcpListener) -> io::Result<Self> {
         if super::bed()?.is_some() {
-            return from_placeholder::<dyn Listener>(&listener, "TcpListener::from_std").map(|found| Self(Either::Bed(found.into())));
+            return from_placeholder::<dyn Listener>(listener, "TcpListener::from_std").map(|found| Self(Either::Bed(found)));
         }
         real::net::TcpListener::from_std(listener).map(|real| Self(Either::Real(real)))
     }

@@ -18,8 +18,6 @@ mod halves;
 mod listener;
 #[cfg(feature = "net")]
 mod lookup;
-#[cfg(all(feature = "net", unix))]
-mod placeholder;
 #[cfg(feature = "net")]
 mod ready;
 #[cfg(feature = "net")]

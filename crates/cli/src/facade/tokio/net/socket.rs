@@ -9,8 +9,6 @@ use cohaptic_sockets::{Call, Flag, Number, Socket, Version};
 
 use super::bed_socket::BedSocket;
 use super::descriptors::{descriptors, into_placeholder, refuse_real};
-#[cfg(unix)]
-use super::placeholder;
 use super::{Either, TcpListener, TcpStream, either};
 
 /// See `tokio::net::TcpSocket`.
@@ -178,11 +176,11 @@ impl TcpSocket {
         use std::os::fd::AsFd;
         let (bed, fd) = (super::bed().ok()??, stream.as_fd());
         // A placeholder comes back to its own socket. Any other unbound socket becomes a new socket of the test bed.
-        if let Some(socket) = placeholder::take::<dyn Socket>(fd).ok()? {
+        if let Some(socket) = cohaptic_descriptors::take(fd).ok()? {
             return Some(socket);
         }
-        let socket = bed.socket(Call::here("TcpSocket::from_std_stream"), placeholder::unbound(fd)?).ok()?;
-        placeholder::set_all(&*socket, fd).ok()?;
+        let socket = bed.socket(Call::here("TcpSocket::from_std_stream"), cohaptic_descriptors::unbound(fd)?).ok()?;
+        cohaptic_descriptors::set_all(socket2::Type::STREAM, &*socket, fd).ok()?;
         Some(socket)
     }
 }

@@ -46,7 +46,7 @@ impl TcpStream {
     #[track_caller]
     pub fn from_std(stream: std::net::TcpStream) -> io::Result<Self> {
         if super::bed()?.is_some() {
-            return from_placeholder::<dyn Stream>(&stream, "TcpStream::from_std").map(|found| Self(Either::Bed(found.into())));
+            return from_placeholder::<dyn Stream>(stream, "TcpStream::from_std").map(|found| Self(Either::Bed(found)));
         }
         real::net::TcpStream::from_std(stream).map(|real| Self(Either::Real(real)))
     }

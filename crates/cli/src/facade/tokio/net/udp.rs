@@ -49,7 +49,7 @@ impl UdpSocket {
     #[track_caller]
     pub fn from_std(socket: std::net::UdpSocket) -> io::Result<Self> {
         if super::bed()?.is_some() {
-            return from_placeholder::<dyn Datagrams>(&socket, "UdpSocket::from_std").map(|found| Self(Either::Bed(found.into())));
+            return from_placeholder::<dyn Datagrams>(socket, "UdpSocket::from_std").map(|found| Self(Either::Bed(found)));
         }
         real::net::UdpSocket::from_std(socket).map(|real| Self(Either::Real(real)))
     }

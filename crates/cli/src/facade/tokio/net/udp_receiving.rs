@@ -18,12 +18,12 @@ async fn receive<T>(socket: &dyn Datagrams, peek: bool, mut look: impl FnMut(&[u
 
 fn poll<T>(socket: &dyn Datagrams, cx: &mut Context<'_>, peek: bool, mut look: impl FnMut(&[u8], SocketAddr) -> T) -> Poll<io::Result<T>> {
     let mut seen = None;
-    socket.poll_receive(cx, peek, &mut |bytes, from| seen = Some(look(bytes, from))).map_ok(|()| seen.expect("a received datagram is handed over"))
+    socket.poll_receive(cx, peek, &mut |datagram| seen = Some(look(datagram.bytes, datagram.from))).map_ok(|()| seen.expect("a received datagram is handed over"))
 }
 
 fn try_receive<T>(socket: &dyn Datagrams, peek: bool, mut look: impl FnMut(&[u8], SocketAddr) -> T) -> io::Result<T> {
     let mut seen = None;
-    socket.try_receive(peek, &mut |bytes, from| seen = Some(look(bytes, from)))?;
+    socket.try_receive(peek, &mut |datagram| seen = Some(look(datagram.bytes, datagram.from)))?;
     Ok(seen.expect("a received datagram is handed over"))
 }
 

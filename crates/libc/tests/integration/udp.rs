@@ -1,0 +1,130 @@
+use std::io::ErrorKind;
+use std::net::{SocketAddr, UdpSocket};
+use std::time::Duration;
+
+use cohaptic_testkit::time::sleep;
+use cohaptic_testkit::{Bed, Testbed, UdpSocket as Virtual};
+use socket2::{Domain, Socket, Type};
+
+use crate::run;
+
+fn bind(at: &str) -> UdpSocket {
+    let socket = UdpSocket::bind(at).unwrap();
+    socket.set_nonblocking(true).unwrap();
+    socket
+}
+
+#[test]
+fn datagrams_take_the_link() {
+    run(async |bed: Bed| {
+        let server = bed.host("server").spawn(async {
+            let socket = bind("0.0.0.0:7");
+            let mut buffer = [0; 9];
+            assert_eq!(socket.recv_from(&mut buffer).unwrap_err().kind(), ErrorKind::WouldBlock);
+            sleep(Duration::from_millis(9)).await;
+            assert_eq!(socket.recv_from(&mut buffer).unwrap_err().kind(), ErrorKind::WouldBlock);
+            sleep(Duration::from_millis(2)).await;
+            assert_eq!(socket.peek(&mut buffer[..2]).unwrap(), 2);
+            let (count, from) = socket.recv_from(&mut buffer).unwrap();
+            assert_eq!((&buffer[..count], from.ip().to_string()), (&b"question"[..], "10.0.0.1".to_owned()));
+            socket.send_to(b"answer", from).unwrap();
+        });
+        let client = bed.host("client").spawn(async {
+            let socket = bind("0.0.0.0:0");
+            socket.connect("10.0.0.2:7").unwrap();
+            assert_eq!(socket.peer_addr().unwrap().to_string(), "10.0.0.2:7");
+            assert_eq!(socket.local_addr().unwrap().ip().to_string(), "10.0.0.1");
+            assert_eq!(socket.send(b"question").unwrap(), 8);
+            sleep(Duration::from_millis(21)).await;
+            // A duplicate is the same socket, and outlives the first descriptor.
+            let other = socket.try_clone().unwrap();
+            drop(socket);
+            let mut buffer = [0; 3];
+            assert_eq!((other.recv(&mut buffer).unwrap(), &buffer), (3, b"ans"));
+        });
+        server.await.unwrap();
+        client.await.unwrap();
+    });
+}
+
+/// A port is free again after the last descriptor was closed, and not before.
+#[test]
+fn the_last_descriptor_closes_the_socket() {
+    run(async |bed: Bed| {
+        let client = bed.host("client").spawn(async {
+            let socket = bind("0.0.0.0:9");
+            let other = socket.try_clone().unwrap();
+            drop(socket);
+            assert_eq!(UdpSocket::bind("0.0.0.0:9").unwrap_err().kind(), ErrorKind::AddrInUse);
+            drop(other);
+            // The sockets of the test kit itself have the same ports.
+            drop(Virtual::bind("0.0.0.0:9").await.unwrap());
+            drop(bind("0.0.0.0:9"));
+        });
+        client.await.unwrap();
+    });
+}
+
+#[test]
+fn errors_have_the_numbers_of_linux() {
+    run(async |bed: Bed| {
+        let client = bed.host("client").spawn(async {
+            let socket = bind("0.0.0.0:0");
+            let to = |text: &str| text.parse::<SocketAddr>().unwrap();
+            let number = |outcome: std::io::Result<usize>| outcome.unwrap_err().raw_os_error().unwrap();
+            assert_eq!(number(socket.send(b"x")), libc::EDESTADDRREQ);
+            assert_eq!(number(socket.send_to(b"x", to("255.255.255.255:1"))), libc::EACCES);
+            socket.set_broadcast(true).unwrap();
+            socket.send_to(b"x", to("255.255.255.255:1")).unwrap();
+            assert_eq!(number(socket.send_to(&[0; 70_000], to("10.0.0.2:1"))), libc::EMSGSIZE);
+            assert_eq!(number(socket.send_to(b"x", to("[fd00::2]:1"))), libc::EAFNOSUPPORT);
+            assert_eq!(UdpSocket::bind("10.0.0.9:0").unwrap_err().raw_os_error(), Some(libc::EADDRNOTAVAIL));
+            socket.connect("10.0.0.2:99").unwrap();
+            socket.send(b"x").unwrap();
+            sleep(Duration::from_millis(21)).await;
+            assert_eq!(socket.take_error().unwrap().unwrap().raw_os_error(), Some(libc::ECONNREFUSED));
+            assert!(socket.take_error().unwrap().is_none());
+        });
+        client.await.unwrap();
+    });
+}
+
+/// The placeholder has the options, and the socket of the test bed follows.
+#[test]
+fn options_that_are_set_before_and_after_the_bind_hold() {
+    run(async |bed: Bed| {
+        let client = bed.host("client").spawn(async {
+            let socket = Socket::new(Domain::IPV4, Type::DGRAM, None).unwrap();
+            socket.set_nonblocking(true).unwrap();
+            // The kernel doubles the size, and finds it too small for two datagrams of 1000 octets.
+            socket.set_recv_buffer_size(1500).unwrap();
+            socket.bind(&"0.0.0.0:5".parse::<SocketAddr>().unwrap().into()).unwrap();
+            socket.set_broadcast(true).unwrap();
+            socket.set_ttl_v4(3).unwrap();
+            assert_eq!((socket.recv_buffer_size().unwrap(), socket.ttl_v4().unwrap()), (3000, 3));
+            let socket = UdpSocket::from(socket);
+            for _ in 0..2 {
+                socket.send_to(&[0; 1000], "127.0.0.1:5").unwrap();
+            }
+            let mut buffer = [0; 2000];
+            assert_eq!(socket.recv(&mut buffer).unwrap(), 1000);
+            assert_eq!(socket.recv(&mut buffer).unwrap_err().kind(), ErrorKind::WouldBlock);
+            assert_eq!(socket.send_to(b"all", "255.255.255.255:5").unwrap(), 3);
+            assert_eq!(socket.recv(&mut buffer).unwrap(), 3);
+        });
+        client.await.unwrap();
+    });
+}
+
+#[test]
+fn outside_of_a_test_bed_sockets_are_real() {
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let own = socket.local_addr().unwrap();
+    socket.send_to(b"real", own).unwrap();
+    let mut buffer = [0; 9];
+    assert_eq!(socket.recv_from(&mut buffer).unwrap(), (4, own));
+    // A socket from before is a real one in a test bed as well.
+    Testbed::new(["host"]).run(async move |bed| {
+        bed.host("host").spawn(async move { assert_eq!(socket.send_to(b"real", own).unwrap(), 4) }).await.unwrap();
+    });
+}
