@@ -302,7 +302,8 @@ fn a_signal_reaches_the_command_once() {
     command.process_group(0);
     let running = Running::begin(command);
     running.said("ready");
-    for target in [running.id(), format!("-{}", running.id()), running.id()] {
+    // The group comes last: the program may still have its own copy of that signal unread, and the system merges a second signal of the kind with the copy.
+    for target in [running.id(), running.id(), format!("-{}", running.id())] {
         assert!(Command::new("kill").args(["-INT", "--", &target]).status().unwrap().success());
         running.said("interrupted");
     }

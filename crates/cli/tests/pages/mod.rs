@@ -100,6 +100,7 @@ pages! {
     study: "docs/study.md",
     how_to_study: "docs/how-to-study.md",
     live_control: "docs/live-control.md",
+    live_protocol: "docs/live-protocol.md",
     measured_cluster: "docs/measured-cluster.md",
     measured_router: "docs/measured-router.md",
     gallery: "docs/gallery.md",
