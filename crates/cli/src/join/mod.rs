@@ -18,7 +18,8 @@ use cohaptic_scene::{PeerKind, Scene};
 use crate::arguments::{JoinArguments, JoinDevice};
 use crate::failure::{Failure, INTERRUPTED};
 use crate::file::own_folder;
-use crate::live::devices;
+use crate::live::exchanges::DeviceFacts;
+use crate::live::{devices, exchanges};
 use crate::progress::Progress;
 use crate::realtime::{say, some_length};
 use crate::{input, interrupt, output};
@@ -52,14 +53,17 @@ pub(crate) fn join(arguments: &JoinArguments) -> Result<ExitCode, Failure> {
     let joined = Joined { scene: &theirs, place, session: arguments.session, device: arguments.device, identity, is_keyed };
     // Before the device, which a person would have to home in vain.
     Join::check(&scene, place, &config).map_err(|error| refused(error, &joined))?;
-    let Some(device) = open_device(arguments, &scene, place)? else { return Ok(ExitCode::from(INTERRUPTED)) };
+    let Some((device, facts)) = open_device(arguments, &scene, place)? else { return Ok(ExitCode::from(INTERRUPTED)) };
     let join = Join::open(&scene, place, config, device).map_err(|error| refused(error, &joined))?;
     say(&format!("asking {} to be {} at place {place}: session {}, scene {identity}", arguments.session, arguments.peer, theirs.seed));
-    let report = conduct(join, &joined)?;
+    let mut report = conduct(join, &joined)?;
+    // The peer has dropped its device, so that the facts are whole.
+    let devices = facts.reports(&scene);
+    report.validity = exchanges::judge(report.validity, &devices);
     if !joined.was_heard(&report.status) && !interrupt::requested() {
         return Err(Failure::System(joined.reasons()));
     }
-    output::text(&report::describe(&joined, &report))?;
+    output::text(&report::describe(&joined, &report, &devices))?;
     output::wrote(&report.files);
     Ok(if interrupt::requested() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
@@ -103,10 +107,11 @@ fn label(device: JoinDevice) -> Label {
 /// Device in a hand; `None` for a device that the peer simulates.
 type Opened = Option<Box<dyn Device>>;
 
-/// Opens the device of the peer, and waits until a simulated hand has homed a simulated Falcon. Returns `None` if the user asked for the end while waiting.
-fn open_device(arguments: &JoinArguments, scene: &Scene, place: usize) -> Result<Option<Opened>, Failure> {
+/// Opens the device of the peer, and waits until a simulated hand has made a simulated device ready. Returns the device with handles to facts about the device,
+/// or `None` if the user asked for the end while waiting.
+fn open_device(arguments: &JoinArguments, scene: &Scene, place: usize) -> Result<Option<(Opened, DeviceFacts)>, Failure> {
     match arguments.device {
-        JoinDevice::Simulated => Ok(Some(None)),
+        JoinDevice::Simulated => Ok(Some((None, DeviceFacts::default()))),
         JoinDevice::Falcon | JoinDevice::Inverse3 => {
             // The devices of the other peers are elsewhere.
             let mut own = scene.clone();
@@ -114,11 +119,11 @@ fn open_device(arguments: &JoinArguments, scene: &Scene, place: usize) -> Result
             if let Some(error) = devices::undriven(&own, &here(arguments)) {
                 return Err(error.into());
             }
-            let Some((mut devices, _)) = devices::ready(&own, arguments.firmware.as_deref(), arguments.pace.wishes())? else { return Ok(None) };
+            let Some((mut devices, facts)) = devices::ready(&own, arguments.firmware.as_deref(), arguments.pace.wishes())? else { return Ok(None) };
             // Without this check a kind without a driver would be simulated, and the hand would feel nothing.
             let device =
                 devices[place].take().ok_or_else(|| Failure::System(format!("--device {}: no driver opened it", arguments.device.kind())))?;
-            Ok(Some(Some(device)))
+            Ok(Some((Some(device), facts)))
         }
     }
 }

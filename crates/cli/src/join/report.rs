@@ -9,6 +9,7 @@ use cohaptic_units::print::{Counted, Span};
 
 use crate::arguments::JoinDevice;
 use crate::live::answer::without_force;
+use crate::live::exchanges::DeviceReport;
 use crate::realtime::{late, notes};
 use crate::run::answer::length;
 
@@ -61,7 +62,7 @@ impl Joined<'_> {
 }
 
 /// Returns the report.
-pub(super) fn describe(joined: &Joined<'_>, report: &JoinReport) -> String {
+pub(super) fn describe(joined: &Joined<'_>, report: &JoinReport, devices: &[DeviceReport]) -> String {
     let Joined { scene, place, session, device, .. } = joined;
     let status = &report.status;
     let name = &scene.peers[*place].name;
@@ -75,6 +76,7 @@ pub(super) fn describe(joined: &Joined<'_>, report: &JoinReport) -> String {
     if let Some(device) = &report.device {
         line(format!("reading and holding the device took, a tick: {}", late(device)));
     }
+    devices.iter().flat_map(|device| device.lines(name)).for_each(&mut line);
     report.gate.iter().filter_map(|gate| without_force(name, gate)).for_each(&mut line);
     let joinings = if joined.is_keyed { format!(" in {}", Counted(status.joinings, "joining")) } else { String::new() };
     line(format!("{} sent{joinings}", Counted(status.sent, "sample")));

@@ -123,11 +123,7 @@ pub(super) fn describe(scene: &Scene, report: &Report, devices: &[DeviceReport])
         line(format!("{} ({}) ends at {}{seat}{way}", peer.name, spec.kind.name(), position.join(", ")));
     }
     report.gates.iter().zip(&scene.peers).filter_map(|(gate, spec)| without_force(&spec.name, gate.as_ref()?)).for_each(&mut line);
-    for DeviceReport { peer, exchanges, error, .. } in devices {
-        let name = &scene.peers[*peer].name;
-        exchanges.lines().into_iter().for_each(|said| line(format!("device of {name}: {said}")));
-        error.iter().for_each(|error| line(format!("device of {name}: ERROR: {error}")));
-    }
+    devices.iter().flat_map(|device| device.lines(&scene.peers[device.peer].name)).for_each(&mut line);
     line(packets(summary));
     report.task.iter().for_each(|task| line(format!("task: {}", task_words(task, scene))));
     measured_lines(scene, &report.measures).into_iter().for_each(&mut line);

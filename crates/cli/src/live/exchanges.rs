@@ -17,21 +17,29 @@ pub(crate) struct DeviceFacts {
 }
 
 /// Exchanges with the device of a peer.
-pub(super) struct DeviceReport {
+pub(crate) struct DeviceReport {
     /// Index of the peer.
-    pub(super) peer: usize,
-    pub(super) exchanges: Exchanges,
+    pub(crate) peer: usize,
+    pub(crate) exchanges: Exchanges,
     /// Replies that took longer than an exchange of the scene.
     late: u64,
     readings: u64,
     /// Error of the device, in words.
-    pub(super) error: Option<String>,
+    pub(crate) error: Option<String>,
+}
+
+impl DeviceReport {
+    /// Returns the lines of the report about the device of the peer `name`.
+    pub(crate) fn lines(&self, name: &str) -> Vec<String> {
+        let errors = self.error.iter().map(|error| format!("ERROR: {error}"));
+        self.exchanges.lines().into_iter().chain(errors).map(|said| format!("device of {name}: {said}")).collect()
+    }
 }
 
 impl DeviceFacts {
     /// Returns a report for each device that replies to messages.
     #[cfg(feature = "inverse3")]
-    pub(super) fn reports(&self, scene: &Scene) -> Vec<DeviceReport> {
+    pub(crate) fn reports(&self, scene: &Scene) -> Vec<DeviceReport> {
         let report = |(peer, facts): &(usize, cohaptic_live::inverse3s::Facts)| {
             let summary = facts.summary();
             DeviceReport {
@@ -47,13 +55,13 @@ impl DeviceFacts {
 
     /// Returns no report: this program drives no device that replies to messages.
     #[cfg(not(feature = "inverse3"))]
-    pub(super) const fn reports(&self, _: &Scene) -> Vec<DeviceReport> {
+    pub(crate) const fn reports(&self, _: &Scene) -> Vec<DeviceReport> {
         Vec::new()
     }
 }
 
 /// Returns the verdict on a session with devices: more than one late exchange in a thousand makes the session not valid, as late ticks do.
-pub(super) fn judge(validity: Validity, reports: &[DeviceReport]) -> Validity {
+pub(crate) fn judge(validity: Validity, reports: &[DeviceReport]) -> Validity {
     let is_late = |report: &&DeviceReport| report.late > 1 && report.late > report.readings / 1000;
     match reports.iter().find(is_late).filter(|_| validity.is_valid()) {
         Some(report) => Validity::NotValid { late: report.late, of: report.readings, what: "exchanges with a device", limit: Duration::ZERO },
@@ -64,11 +72,11 @@ pub(super) fn judge(validity: Validity, reports: &[DeviceReport]) -> Validity {
 /// Exchanges of a program that drives no device with exchanges: there is no value.
 #[cfg(not(feature = "inverse3"))]
 #[derive(serde::Serialize)]
-pub(super) enum Exchanges {}
+pub(crate) enum Exchanges {}
 
 #[cfg(not(feature = "inverse3"))]
 impl Exchanges {
-    pub(super) fn lines(&self) -> Vec<String> {
+    pub(crate) fn lines(&self) -> Vec<String> {
         match *self {}
     }
 }

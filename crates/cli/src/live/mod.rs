@@ -2,7 +2,7 @@
 
 pub(crate) mod answer;
 pub(crate) mod devices;
-mod exchanges;
+pub(crate) mod exchanges;
 pub(crate) mod onlookers;
 mod page;
 

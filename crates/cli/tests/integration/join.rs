@@ -131,6 +131,24 @@ fn with_the_key_it_takes_part_and_after_a_loss_of_power_it_joins_again() {
     assert_eq!((seat["joined"].as_u64(), document["door"]["joinings"].as_u64()), (Some(2), Some(2)), "{document:#}");
 }
 
+#[cfg(feature = "inverse3")]
+#[test]
+fn an_inverse3_joins_and_the_report_tells_its_exchanges() {
+    let desk = desk();
+    desk.write("lab.toml", LAB.replace("falcon = {", "inverse3 = {"));
+    let (session, address) = session(&desk, "");
+    let control = Client::of(&session);
+    let line = format!("join {address} lab.toml --peer left --device inverse3 --key-file session.key {UNHURRIED}");
+    let join = Running::begin(desk.command(&line));
+    let state = wait(&control, "present", is_present);
+    assert_eq!(state["peers"][0]["joined"]["device"], "inverse3", "{state:#}");
+    let outcome = join.end_by("-INT");
+    assert_eq!(outcome.status, Some(130), "{}", outcome.stderr);
+    for part in ["with the device inverse3\n", "\n  device of left: ", " exchanges per second, ", "\n  device of left: replies take "] {
+        assert!(outcome.stdout.contains(part), "no {part:?} in {}", outcome.stdout);
+    }
+}
+
 #[test]
 fn a_wrong_key_scene_place_or_kind_is_a_sentence() {
     let desk = desk();
