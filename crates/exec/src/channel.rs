@@ -1,7 +1,7 @@
 //! Messages between this program outside and the process that begins a command inside the namespaces.
 //!
-//! A channel is a pair of Unix sockets that keep the bounds of messages. It exists before the namespaces, so that it leads out of them. The end of one
-//! process is the end of its socket: the other process learns of a death without a message.
+//! A channel is a pair of Unix sockets that keep the boundaries of messages. The pair is made before the namespaces, so the process inside can still reach the
+//! program outside. The system closes a socket when the process ends, so the other process notices the end without a message.
 
 use std::io::{self, IoSlice, IoSliceMut};
 use std::mem::MaybeUninit;
@@ -36,7 +36,7 @@ pub(crate) enum Report {
 pub(crate) enum Order {
     /// Start the command. The descriptor that comes with the message is its standard input.
     Start,
-    /// Send the command a signal, by its number.
+    /// Send the signal with this number to the command.
     Signal(u8),
 }
 
@@ -50,7 +50,7 @@ impl Channel {
         Ok((Self { socket: one }, Self { socket: other }))
     }
 
-    /// Returns the end that a process has as its standard input.
+    /// Returns the end that this process has got as its standard input.
     pub(crate) fn of_standard_input() -> io::Result<Self> {
         Ok(Self { socket: io::stdin().as_fd().try_clone_to_owned()? })
     }
@@ -129,7 +129,7 @@ impl Channel {
                 Err(error) => return Err(error.into()),
             }
         };
-        // No message is empty, so an empty one is the end.
+        // No message is empty, so zero bytes mean that the other end is closed.
         if received.bytes == 0 {
             return Ok(None);
         }

@@ -57,9 +57,9 @@ pub struct Departure {
 /// Packets that no link has taken, by reason.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Counts {
-    /// Packets that contradict themselves.
+    /// Packets that are not IP, or whose headers contradict their length.
     pub malformed: u64,
-    /// Packets to an address that no host has, such as the multicast addresses to which hosts speak by themselves.
+    /// Packets to an address that no other host has, such as the multicast groups to which systems send by themselves.
     pub no_host: u64,
     /// Packets dropped because too much was inside the links.
     pub overload: u64,
@@ -126,7 +126,7 @@ impl Exchange {
 
     /// Returns the host that gets the packets to an address.
     fn receiver(&self, address: IpAddr) -> Option<NodeId> {
-        // A gateway leads to single hosts: nobody beyond it hears what is said to all.
+        // A gateway leads to single hosts, so packets to many receivers are not for the gateway.
         let is_to_all = address.is_multicast() || address.is_unspecified() || address == IpAddr::V4(core::net::Ipv4Addr::BROADCAST);
         self.routes.get(&address).copied().or_else(|| self.gateway.filter(|_| !is_to_all))
     }
@@ -158,7 +158,7 @@ impl Exchange {
         self.departures.pop_front()
     }
 
-    /// Collects the events of the links: deliveries become departures, and every end frees room.
+    /// Collects the events of the links: deliveries become departures, and each packet that ends frees room.
     fn drain(&mut self) {
         while let Some(event) = self.network.poll_event() {
             let (from, bytes) = (usize::from(event.path.from.0), i64::try_from(event.size.get()).unwrap_or(i64::MAX));
@@ -232,7 +232,7 @@ mod tests {
         Packet::checked(bytes)
     }
 
-    /// Packets go to the host of their address, all others to the gateway, and those to everybody to nobody.
+    /// A packet goes to the host of its address, and otherwise to the gateway. A packet to a multicast or broadcast address, or to its sender, goes nowhere.
     #[test]
     fn the_address_chooses_the_host() {
         let mut exchange = exchange("delay=10ms");

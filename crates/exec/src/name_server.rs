@@ -17,7 +17,7 @@ fn first_of(text: &str) -> Option<SocketAddr> {
         if words.next() != Some("nameserver") {
             return None;
         }
-        // An address of one link only names its interface, which means nothing to a socket here.
+        // A link-local address names its interface too (fe80::1%eth0), is no `IpAddr`, and is skipped: a socket would need the number of the interface.
         let address: IpAddr = words.next()?.parse().ok()?;
         Some(SocketAddr::new(address, DNS))
     };

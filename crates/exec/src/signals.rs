@@ -1,9 +1,9 @@
 //! Signals that reach the command once.
 //!
 //! All processes of an `exec` are in one process group. A signal of the terminal (Ctrl-C) reaches the whole group, the command included. A signal that
-//! another process sends to the program alone must be passed on to the command, and a signal that another process sends to the whole group must not. The
-//! system does not tell both apart, but process 1 can: it is in the group too. The program waits a moment before it passes a signal on, and process 1 drops
-//! what it has got itself meanwhile.
+//! another process sends to the program alone must be passed on to the command, and a signal to the whole group must not be passed on. The program cannot
+//! distinguish the two cases, but process 1 can, because process 1 is in the group too. The program waits for [`GROUP`] before passing a signal on, and
+//! process 1 drops a signal that has also reached process 1 directly.
 
 use core::time::Duration;
 use std::io;

@@ -27,11 +27,11 @@ pub(crate) struct Emulation {
     ports: Vec<Port>,
     clock: MonotonicClock,
     stop: Arc<Stop>,
-    /// Pipe of [`Stop`], until its wish is seen.
+    /// Pipe of [`Stop`]; `None` after the loop has seen the wish.
     woken: Option<PipeReader>,
-    /// Time from the logical departure of each packet to its handing over.
+    /// Time from the logical departure of each packet to the write to its receiver.
     release: Lateness,
-    /// Packets of the current reading, empty between readings.
+    /// Packets of the current read; empty between reads.
     incoming: Vec<Packet>,
     /// Packets that have left their links, indexed by receiver.
     leaving: Vec<Leaving>,
@@ -41,7 +41,7 @@ pub(crate) struct Emulation {
     captures: Vec<Option<Capture>>,
     /// First error of a capture. The run goes on without the captures.
     capture_error: Option<io::Error>,
-    /// The latest reading found nothing.
+    /// `true` if the latest read of all devices and sockets found nothing.
     is_read_out: bool,
 }
 
@@ -61,7 +61,7 @@ struct Leaving {
     at: Vec<Instant>,
 }
 
-/// Approximate time to read a packet and to deal with it, as for the router.
+/// Approximate time to read a packet and to offer the packet to its link, as for the router.
 const READING: Duration = Duration::from_micros(10);
 
 /// Packets read from one device before departures are written and the next device gets its turn, as for the router.
@@ -100,7 +100,7 @@ impl Emulation {
     ///
     /// The error of a device, or of the system if it refuses to wait.
     pub(crate) fn run(&mut self, pacing: Pacing) -> io::Result<()> {
-        /// Longest time until the end of a run that waits for its last data is noticed.
+        /// Time between two checks whether the last data has arrived.
         const LOOK: Duration = Duration::from_millis(50);
         drive(self, &Schedule { pacing, end: None, look_every: LOOK }, |_, _| ControlFlow::Continue(()))
     }
@@ -144,7 +144,7 @@ impl Emulation {
         self.capture_error.take()
     }
 
-    /// Hands a packet of a host to the links.
+    /// Offers a packet of a host to the links.
     fn offer(&mut self, now: Instant, from: usize, packet: Packet) {
         self.capture(from, |capture| capture.write_sent(now, packet.bytes()));
         self.exchange.handle_packet(now, NodeId::new(from), packet);
@@ -159,7 +159,7 @@ impl Emulation {
         }
     }
 
-    /// Hands the packets of the gateways to the links.
+    /// Offers the packets of the gateways to the links.
     fn take_answers(&mut self, now: Instant) {
         for node in 0..self.ports.len() {
             while let Port::Gateway(gateway) = &mut self.ports[node]
@@ -181,7 +181,7 @@ impl Emulation {
         }
     }
 
-    /// Hands the packets that have left their links to a receiver. Returns their number.
+    /// Writes the packets that have left their links to the receiver `node`. Returns the number of packets.
     fn deliver(&mut self, node: usize) -> u64 {
         let Leaving { packets, at } = &mut self.leaving[node];
         let count = packets.len() as u64;
@@ -190,7 +190,7 @@ impl Emulation {
                 let mut rest = packets.as_slice();
                 let mut at = at.drain(..);
                 while !rest.is_empty() {
-                    // Lateness is measured before the call, which hands over all packets of the group at once.
+                    // Lateness is measured before the call, which writes all packets of the group at once.
                     let now = self.clock.now();
                     let (done, sent) = device.send(rest);
                     // At least one packet is settled by each call, so that the loop ends.
@@ -234,7 +234,7 @@ impl Driven for Emulation {
 
     /// Reads waiting packets from the devices, and answers from the sockets, in turns.
     fn receive(&mut self, now: Instant) -> io::Result<Received> {
-        // Without the pipe, which stays readable, the loop waits for the last data as for all others.
+        // The pipe stays readable, and a loop with the pipe would never wait again. The loop still has to wait for the last data.
         if self.stop.is_wished() {
             self.woken = None;
         }
@@ -296,7 +296,7 @@ impl Driven for Emulation {
         false
     }
 
-    /// Hands over all packets that have left their links. An answer of the gateway over a link without delay leaves in the same call.
+    /// Writes all packets that have left their links to their receivers. An answer of the gateway over a link without delay leaves in the same call.
     fn send(&mut self) -> u64 {
         let mut sent = 0;
         loop {

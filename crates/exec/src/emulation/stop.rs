@@ -1,4 +1,4 @@
-//! End of a run, as another thread wishes it.
+//! End of a run at the wish of another thread.
 
 use core::time::Duration;
 use std::io::{self, PipeReader, PipeWriter, Write as _};
@@ -14,7 +14,7 @@ pub(crate) struct Stop {
     /// Latest end after [`Stop::FINISH`] \[ns\].
     end: AtomicU64,
     clock: MonotonicClock,
-    /// Pipe that becomes readable with the wish, so that the loop need not look for it often.
+    /// Pipe that becomes readable with the wish, so that a waiting loop wakes up.
     wakes: PipeWriter,
 }
 
@@ -55,7 +55,7 @@ impl Stop {
     }
 
     fn wish(&self, wish: u8) {
-        // The wake-up comes after the wish and publishes it, and with it the end.
+        // Release publishes `end`, stored before, to a loop that sees the wish. The wake-up comes last: a woken loop finds the wish.
         self.wish.fetch_max(wish, Ordering::Release);
         // A loop that has ended does not read the pipe any more.
         let _ = (&self.wakes).write_all(b"w");

@@ -10,9 +10,9 @@ pub const fn host(index: u8) -> [IpAddr; 2] {
 
 /// Addresses of the first host.
 pub(super) const HOST: [IpAddr; 2] = host(0);
-/// Addresses of the gateway. Beyond the gateway they stand for the loopback interface of the real machine.
+/// Addresses of the gateway, which stand for the loopback interface of the real machine.
 pub const GATEWAY: [IpAddr; 2] = [v4(2), v6(2)];
-/// Addresses of the name server. Beyond the gateway they stand for the name server of the real machine.
+/// Addresses of the name server, which stand for the name server of the real machine.
 pub const NAMES: [IpAddr; 2] = [v4(3), v6(3)];
 /// Bits of the network in the addresses above, as \[IPv4, IPv6\].
 pub const PREFIX: [u8; 2] = [24, 64];

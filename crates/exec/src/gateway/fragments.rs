@@ -7,10 +7,10 @@ use std::collections::BTreeMap;
 use cohaptic_router::{Content, Fragment, Packet};
 use cohaptic_units::Instant;
 
-/// Time for which fragments wait for the others (RFC 8200, section 4.5, asks for 60 s; Linux has 30 s).
+/// Time for which fragments wait for missing fragments (RFC 8200, section 4.5, asks for 60 s; Linux has 30 s).
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Packets that wait for fragments at most. A further packet takes the place of the one that waits for longest.
+/// Largest number of packets that wait for fragments. A further packet takes the place of the packet that has waited longest.
 const MOST: usize = 64;
 
 /// Packets of which fragments have arrived.
@@ -32,7 +32,7 @@ struct Parts {
 }
 
 impl Fragments {
-    /// Takes a fragment. Returns the packet if the fragment was the last one that was missing.
+    /// Takes a fragment. Returns the packet if no fragment is missing any more.
     pub(super) fn take(&mut self, now: Instant, packet: &Packet) -> Option<Packet> {
         let Content::Ip { headers, .. } = packet.content() else { return None };
         let Fragment { identification, protocol, offset, is_last, data } = packet.fragment()?;
@@ -87,7 +87,7 @@ mod tests {
             assert_eq!(taken[2].as_ref().unwrap().datagram_data(), Some(data.as_slice()));
             assert!(fragments.waiting.is_empty());
         }
-        // Too late, and twice the same.
+        // A fragment that comes twice, and a fragment that comes too late.
         let mut fragments = Fragments::default();
         for (seconds, place) in [(0, 0), (1, 1), (1, 1), (31, 2)] {
             assert!(fragments.take(at(seconds), &parts[place]).is_none());

@@ -1,12 +1,12 @@
-//! Gateway to the real world: what a program inside sends to other addresses than those of its network leaves through sockets of the real machine.
+//! Gateway to the real world: packets that a program inside sends to addresses outside of its network leave as data through sockets of the real machine.
 //!
 //! ```text
 //!   program ── TUN ── link ──▶ Gateway ── sockets ──▶ the machine's loopback, name server, networks
 //! ```
 //!
 //! The gateway ends TCP: inside stands a [`cohaptic_tcp::Connection`], outside a socket of the system, and data passes between both. So the link carries real
-//! segments, with their losses and retransmissions, and no right over the machine's network is needed. Each pair of ends of UDP has a connected socket. Echo
-//! requests to the gateway are answered. All else is dropped and counted.
+//! segments, with losses and retransmissions, and no right over the machine's network is needed. Each pair of ends of UDP has a connected socket. Echo
+//! requests to the gateway are answered. All other packets are dropped and counted.
 //!
 //! Time is an argument, but the sockets are real: [`Gateway::poll`] asks the system without waiting.
 
@@ -68,7 +68,7 @@ enum Owner {
     Port(usize),
 }
 
-/// Sockets that wait for the system, and what both tables need: packets to the program inside, and memory.
+/// Real sockets with their events, and the parts that the tables of TCP and UDP share: packets to the program inside, and memory.
 #[derive(Debug)]
 struct Sockets {
     epoll: OwnedFd,
@@ -181,7 +181,7 @@ impl Gateway {
             return;
         };
         if !headers.is_whole {
-            // A fragment that never finds the others is lost without a count, as on a line.
+            // A fragment of a packet that never becomes whole is lost without a count, as on a line.
             if let Some(whole) = self.fragments.take(self.now, packet) {
                 self.handle_packet(now, &whole);
             }
@@ -220,7 +220,7 @@ impl Gateway {
         self.sockets.out.pop_front()
     }
 
-    /// Returns whether everything that arrived from inside has gone out, and no connection from inside may bring more.
+    /// Returns whether all data from inside has gone out, and every connection from inside has ended its data.
     #[must_use]
     pub fn is_delivered(&self) -> bool {
         self.tcp.is_delivered()

@@ -103,7 +103,7 @@ impl Relay {
         self.connection.close(now);
     }
 
-    /// Returns whether nothing of what the program inside has sent is still on the way to the socket: the program has ended its data, and all has gone out.
+    /// Returns whether the program inside has ended its data, and all data has gone out to the socket.
     pub(super) fn is_delivered(&self) -> bool {
         self.socket.is_none() || self.outward.is_shut
     }

@@ -22,7 +22,7 @@ const TTL: u8 = 64;
 #[derive(Debug, Default)]
 pub(super) struct TcpTable {
     flows: BTreeMap<Ends, Flow>,
-    /// Deadlines of the connections, as far as these have one.
+    /// Deadlines of the connections that have a deadline.
     deadlines: BTreeSet<(Instant, Ends)>,
     listeners: Vec<(TcpListener, u16)>,
 }
@@ -139,7 +139,7 @@ impl TcpTable {
         while let Some((Ok((socket, client)), port)) = self.listeners.get(place).map(|(listener, port)| (listener.accept(), *port)) {
             let inside = SocketAddr::new(HOST[0], port);
             let gateway = |port| Ends { inside, outside: SocketAddr::new(address::gateway(inside.ip()), port) };
-            // The port of the client, so that a server sees the ports that the client sees; or the next port that is free.
+            // The server sees the client's own port if the port is free here, and otherwise the next free port.
             let ports = (client.port()..=u16::MAX).chain(1..client.port());
             let Some(ends) = ports.map(gateway).find(|ends| !self.flows.contains_key(ends)) else { continue };
             let opened = socket.set_nonblocking(true).and_then(|()| socket.set_nodelay(true)).and_then(|()| {
@@ -203,13 +203,13 @@ impl TcpTable {
     }
 }
 
-/// Returns the constants of the end inside: those of Linux, without Nagle's algorithm, because the data comes from a sender that has waited already.
+/// Returns the constants of the end inside: as in Linux, but without Nagle's algorithm, because the real sender has already waited for acknowledgements.
 fn config() -> TcpConfig {
     TcpConfig { nodelay: true, ..TcpConfig::default() }
 }
 
-/// Returns the first sequence number of a connection. It counts up every 4 µs, as RFC 9293 says in section 3.4.1. The numbers need not be hard to guess: nobody
-/// but the host itself can send to its device.
+/// Returns the first sequence number of a connection, which grows by 1 every 4 µs (RFC 9293, section 3.4.1). The numbers may be easy to guess, because only the
+/// host itself can send to its device.
 fn initial(now: Instant) -> u32 {
     u32::try_from((now.as_nanos() / 4000) % (1 << 32)).unwrap_or(0)
 }
@@ -232,7 +232,7 @@ fn refuse(sockets: &mut Sockets, segment: &Segment<'_>) {
 /// Tells the program inside why its connection could not be opened, as the network would.
 fn fail(sockets: &mut Sockets, ends: Ends, syn: &Segment<'_>, error: &io::Error) {
     if error.kind() == io::ErrorKind::TimedOut {
-        // Silence: the program inside repeats its SYN, and gives up when it wants to.
+        // No answer: the program inside repeats the SYN until its own time-out.
         return;
     }
     // A port where nobody listens answers by a reset.

@@ -127,7 +127,7 @@ impl UdpTable {
                     deliver(sockets, ends, length);
                 }
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => return,
-                // The error of an earlier datagram. The next call reads on.
+                // The call reports the error of an earlier datagram. The next call receives a datagram.
                 Err(error) => tell(sockets, ends, &error),
             }
         }
@@ -139,7 +139,7 @@ impl UdpTable {
             let (length, client) = match received {
                 Ok(received) => received,
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => return,
-                // The error of an earlier answer, whose client is gone.
+                // The call reports the error of an earlier answer, to a client that is gone.
                 Err(_) => continue,
             };
             let known = self.clients.get(&(place, client)).copied().filter(|ends| self.flows.contains_key(ends));
@@ -151,7 +151,7 @@ impl UdpTable {
         }
     }
 
-    /// Gives a new client a port of the gateway: the client's own, or the next that is free.
+    /// Gives a new client a port of the gateway: the client's own port, or the next free port.
     fn meet(&mut self, sockets: &mut Sockets, now: Instant, place: usize, port: u16, client: SocketAddr) -> Option<Ends> {
         let inside = SocketAddr::new(HOST[0], port);
         let ports = (client.port()..=u16::MAX).chain(1..client.port());

@@ -65,7 +65,7 @@ fn begin(setup: &Setup, channel: &Channel, command: &[OsString]) -> Result<std::
     init.spawn().map_err(|error| refusal::words("start process 1", &error))
 }
 
-/// Moves this process into new namespaces. Where the process may not, a user namespace comes first, in which the process may.
+/// Moves this process into new namespaces. A process without the right makes a user namespace too, in which the process has the right.
 fn separate(names: bool) -> io::Result<()> {
     let spaces = CloneFlags::CLONE_NEWNET | CloneFlags::CLONE_NEWNS | CloneFlags::CLONE_NEWPID;
     let spaces = if names { spaces | CloneFlags::CLONE_NEWUTS } else { spaces };
@@ -73,11 +73,11 @@ fn separate(names: bool) -> io::Result<()> {
         Err(nix::errno::Errno::EPERM) => {}
         done => return Ok(done?),
     }
-    // The ids are read before, because the new namespace has none yet.
+    // The ids are read before the move, because a new user namespace maps no ids yet.
     let (user, group) = (nix::unistd::geteuid(), nix::unistd::getegid());
     unshare(spaces | CloneFlags::CLONE_NEWUSER)?;
-    // Both ids stand for themselves, so that files and processes inside have the owner that they would have outside. A process without rights may map nothing
-    // else, and must give up the change of its further groups first.
+    // Both ids are mapped to themselves, so that files and processes have the same owner inside and outside. A process without rights may map no other id, and
+    // may map its group only after giving up `setgroups` (user_namespaces(7)).
     fs::write("/proc/self/setgroups", "deny")?;
     fs::write("/proc/self/uid_map", format!("{user} {user} 1"))?;
     fs::write("/proc/self/gid_map", format!("{group} {group} 1"))?;

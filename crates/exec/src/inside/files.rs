@@ -15,13 +15,13 @@ pub(super) fn mount_privately() -> io::Result<()> {
     Ok(mount(NONE, "/", NONE, MsFlags::MS_REC | MsFlags::MS_PRIVATE, NONE)?)
 }
 
-/// Mounts a view of the processes of this namespace. Containers can forbid that; /proc then still shows each process itself.
+/// Mounts a view of the processes of this namespace. Containers can forbid the mount; in the former /proc each process still finds itself (/proc/self).
 pub(super) fn mount_processes() {
     let flags = MsFlags::MS_NOSUID | MsFlags::MS_NODEV | MsFlags::MS_NOEXEC;
     let _ = mount(Some("proc"), "/proc", Some("proc"), flags, NONE);
 }
 
-/// Lets the command send echo requests and listen at low ports, as the network is its own. Where /proc/sys cannot be written, as in some containers, the
+/// Lets the command send echo requests and listen at low ports, because nobody else uses the network. Where /proc/sys cannot be written, as in some containers, the
 /// command has the rights of its user.
 pub(super) fn allow_ordinary_users() {
     let group = nix::unistd::getegid();
@@ -31,11 +31,11 @@ pub(super) fn allow_ordinary_users() {
 
 /// Replaces /etc/hosts, /etc/resolv.conf and the line of hosts in /etc/nsswitch.conf. An error comes with the step that failed.
 pub(super) fn name_hosts(setup: &Setup) -> Result<(), (String, io::Error)> {
-    // Names stand for addresses of IPv4. Many servers listen at those alone, and a name with both would cost their clients a refusal first.
+    // Names stand for addresses of IPv4 alone. Many servers listen only there, and clients that try IPv6 first would be refused once.
     let v4 = || setup.addresses.iter().map(|network| network.address()).filter(|address| address.is_ipv4());
     let own = setup.name.iter().flat_map(|name| v4().map(move |address| (address, name.clone())));
     let names: Vec<String> = setup.hosts.iter().cloned().chain(own).map(|(address, name)| format!("{address}\t{name}\n")).collect();
-    // Names of the machine stay known. A name of the network comes first, so that it wins.
+    // Names of the machine stay known. Names of the network come first, because the first entry of a name counts.
     replace("/etc/hosts", |text| format!("{}{}", names.concat(), text))?;
     let server = setup.name_server.map_or_else(String::new, |address| format!("nameserver {address}\n"));
     replace("/etc/resolv.conf", |_| server)?;
@@ -48,13 +48,13 @@ fn plain_names(text: &str) -> String {
     text.lines().map(|line| if line.trim_start().starts_with("hosts:") { "hosts: files dns\n".to_owned() } else { format!("{line}\n") }).collect()
 }
 
-/// Puts another text in the place of a file of the machine, for this namespace alone. A file that does not exist stays away.
+/// Puts another text in the place of a file of the machine, for this namespace alone. A file that does not exist is not made.
 fn replace(path: &str, change: impl FnOnce(&str) -> String) -> Result<(), (String, io::Error)> {
     let step = |what: &str| format!("{what} {path}");
     if !Path::new(path).exists() {
         return Ok(());
     }
-    // Bytes that are no text can stand in comments alone.
+    // Bytes that are not UTF-8 occur only in comments of these files, so replacing such bytes changes no meaning.
     let text = fs::read(path).map_err(|error| (step("read"), error))?;
     let own = write_temporary(&change(&String::from_utf8_lossy(&text))).map_err(|error| (step("write a copy of"), error))?;
     let mounted = mount(Some(&own), path, NONE, MsFlags::MS_BIND, NONE);

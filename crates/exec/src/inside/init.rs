@@ -92,7 +92,7 @@ fn watch(channel: &Channel, signals: &SignalFd, child: Pid) -> io::Result<u8> {
                     return Ok(status);
                 }
             } else if !signal.is_of_terminal {
-                // A signal to the whole process group, which the command has got too.
+                // The signal was sent to the whole process group or to process 1 alone. The program outside must not repeat the signal for the command.
                 group.add(signal.signal);
             }
             // All signals come before orders: see `signals`.

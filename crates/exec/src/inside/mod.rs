@@ -4,9 +4,9 @@
 //!   this program ── starts itself ──▶ enter: new namespaces, device, names ── starts itself ──▶ init: process 1, starts the command
 //! ```
 //!
-//! No process can move into a new process namespace itself, only its children can; and a process with several threads cannot have a new user namespace. So
-//! the program starts itself again, twice, by arguments that no user types. Process 1 is this program, not the command: the system ignores signals to process
-//! 1 that it does not handle, and the command would have to wait for the orphans of the namespace.
+//! A new process namespace holds only the children of the process that makes the namespace, and only a process with one thread can make a user namespace. So
+//! the program starts itself twice, by arguments that no user types. Process 1 is this program, not the command: the system ignores signals for which process
+//! 1 has no handler, and the command would have to wait for the orphans of the namespace.
 
 mod enter;
 mod files;
@@ -21,9 +21,9 @@ pub(crate) use enter::offloads;
 pub(crate) use setup::DEVICE;
 pub use setup::Setup;
 
-/// First argument of a process inside. The space keeps it apart from commands.
+/// First argument of a process inside. No command of the program has a space in its name.
 pub(crate) const MARK: &str = "inside exec";
-/// Second argument: which process.
+/// Second argument of the process that makes the namespaces.
 pub(crate) const ENTER: &str = "enter";
 const INIT: &str = "init";
 

@@ -8,11 +8,11 @@ use std::path::Path;
 struct Setting {
     /// File below `/proc/sys`.
     file: &'static str,
-    /// `true` if zero forbids, `false` if every other value does.
+    /// `true` if zero forbids namespaces, `false` if every other value forbids namespaces.
     zero_forbids: bool,
-    /// Value that allows.
+    /// Value that allows namespaces.
     allows: &'static str,
-    /// Systems that forbid.
+    /// Systems that forbid namespaces by default.
     known_from: &'static str,
 }
 

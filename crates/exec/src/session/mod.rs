@@ -42,7 +42,7 @@ pub struct Plan {
     pub pacing: Pacing,
     /// Requests of the thread of the network to the system.
     pub wishes: Wishes,
-    /// Lateness of a packet from which on it is late.
+    /// Lateness above which a packet counts as late.
     pub tolerance: Tolerance,
     /// Folder for a capture of each host, or `None` for no captures.
     pub captures: Option<PathBuf>,
@@ -51,7 +51,7 @@ pub struct Plan {
 /// Host of a [`Plan`].
 #[derive(Clone, Debug)]
 pub struct HostPlan {
-    /// Name of the host: of its links, its capture and its output.
+    /// Name of the host, by which links, captures and output name the host.
     pub name: String,
     /// Network and names that the command sees.
     pub setup: Setup,
@@ -59,16 +59,16 @@ pub struct HostPlan {
     pub command: Vec<OsString>,
     /// `true` if the run ends with this command and has its status.
     pub is_main: bool,
-    /// Text in the output from which on the next hosts may start, or `None` if they may start at once.
+    /// Text in the output after which the next hosts may start, or `None` if the next hosts may start at once.
     pub ready: Option<String>,
-    /// `true` if the output goes line by line to the listener of [`run`], `false` if the command writes where this program writes, and reads what it reads.
+    /// `true` if the output goes line by line to the listener of [`run`], `false` if the command has the standard input and output of this program.
     pub is_piped: bool,
 }
 
 /// Way to the real world.
 #[derive(Clone, Debug)]
 pub struct GatewayPlan {
-    /// Name of the gateway: of its links.
+    /// Name of the gateway, by which links name the gateway.
     pub name: String,
     /// Name server of the machine.
     pub name_server: Option<SocketAddr>,
@@ -114,7 +114,7 @@ pub struct Report {
 ///
 /// # Errors
 ///
-/// [`Failed`] with an exit status, if the hosts cannot be made or a command cannot be started. Everything begun has ended then.
+/// [`Failed`] with an exit status, if the hosts cannot be made or a command cannot be started. All commands have ended by then.
 pub fn run(plan: &Plan, hear: &(dyn Fn(Line<'_>) + Sync)) -> Result<Outcome, Failed> {
     // Before the first thread, so that all threads inherit the mask and the signals wait for `Watch`.
     let signals = signals::passed_on();
@@ -183,7 +183,7 @@ fn open(plan: &GatewayPlan) -> Result<Gateway, Failed> {
     Ok(gateway)
 }
 
-/// Begins the capture of a host. The gateway has none: the captures of the hosts have its packets.
+/// Begins the capture of a host. The gateway has no capture, because the captures of the hosts have all packets.
 fn capture(plan: &Plan, place: usize, node: &Node) -> Result<Option<Capture>, Failed> {
     let Some(folder) = plan.captures.as_deref().filter(|_| place < plan.hosts.len()) else { return Ok(None) };
     let path = capture_path(folder, &node.name);

@@ -39,7 +39,7 @@ pub(super) struct Watch<'a> {
     clock: MonotonicClock,
     /// Status of the run, once it is known.
     status: Option<u8>,
-    /// End of the patience with the other commands, once the run is ending.
+    /// Instant at which the remaining commands are killed; `None` before the run is ending.
     kill_at: Option<Instant>,
 }
 
@@ -50,7 +50,7 @@ impl<'a> Watch<'a> {
         Self { plan, hosts, states, signals, outputs, clock: MonotonicClock::start(), status: None, kill_at: None }
     }
 
-    /// Runs the commands until all have ended, or until those that do not end are given up. Returns the status of the run, and those of the commands.
+    /// Runs the commands until all commands have ended, or until the remaining commands have to be killed. Returns the status of the run and of each command.
     pub(super) fn until_all_have_ended(mut self, stop: &Stop) -> Result<(u8, Vec<Option<u8>>), Failed> {
         while self.hosts.iter().any(Option::is_some) {
             self.start_ready()?;
@@ -59,7 +59,7 @@ impl<'a> Watch<'a> {
             }
             self.wait().map_err(|error| Failed::own(format!("cannot wait for the commands: {error}")))?;
             if self.outputs.has_network_ended() {
-                // The thread of the network says why.
+                // The thread of the network returns the reason.
                 break;
             }
             self.pass_signals().map_err(|error| Failed::own(format!("cannot pass signals on: {error}")))?;
@@ -88,7 +88,7 @@ impl<'a> Watch<'a> {
         Ok(())
     }
 
-    /// Waits for a signal, a report, a host that has become ready, or the end of patience.
+    /// Waits for a signal, a report, a host that has become ready, or the time to kill.
     fn wait(&self) -> io::Result<()> {
         let mut readable: Vec<BorrowedFd<'_>> = self.hosts.iter().flatten().map(|host| host.channel.as_fd()).collect();
         readable.extend([self.signals.as_fd(), self.outputs.as_fd()]);
@@ -104,7 +104,7 @@ impl<'a> Watch<'a> {
         if got.is_of_terminal {
             return Ok(());
         }
-        // Process 1 then has the signal too, if it was sent to the whole group.
+        // After this wait process 1 has got the signal itself, if the signal was sent to the whole group.
         self.clock.block(Some(self.clock.now().saturating_add(signals::GROUP)), &[])?;
         self.tell_all(got.signal);
         Ok(())
