@@ -11,7 +11,7 @@ use std::io;
 use nix::sys::signal::{SigSet, Signal};
 use nix::sys::signalfd::SignalFd;
 
-/// Time in which a signal to a group reaches all of its processes: the system sends them one after the other, within microseconds.
+/// Time in which a signal to a group reaches all processes of the group: the system signals one process after the other, within microseconds.
 pub(crate) const GROUP: Duration = Duration::from_millis(5);
 
 /// Signal that was read.

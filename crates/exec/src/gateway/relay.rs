@@ -96,7 +96,7 @@ impl Relay {
     /// Ends both sides at once.
     pub(super) fn reset(&mut self, now: Instant) {
         if let Some(socket) = self.socket.take() {
-            // With a linger of zero the socket resets its connection when it closes. A failure leaves an ordinary end, which tells the other side less.
+            // With a linger of zero, closing the socket resets the connection. If the option fails, the other side sees an ordinary end.
             let _ = set_socket_linger(&socket, Some(std::time::Duration::ZERO));
         }
         self.connection.abort();

@@ -49,7 +49,7 @@ fn run(channel: &Channel, command: &[OsString], input: OwnedFd) -> Report {
         Ok(signals) => signals,
         Err(error) => return failed(error.into()),
     };
-    // The command inherits the mask, so that the signals are let through for the moment of its start.
+    // The command inherits the signal mask, so the mask is lifted for the moment of the start.
     let mut starting = Command::new(name);
     starting.args(arguments).stdin(Stdio::from(input));
     let _ = all.thread_unblock();
@@ -75,7 +75,7 @@ fn run(channel: &Channel, command: &[OsString], input: OwnedFd) -> Report {
 /// it of all processes of the namespace.
 fn watch(channel: &Channel, signals: &SignalFd, child: Pid) -> io::Result<u8> {
     let mut group = SigSet::empty();
-    // SIGCHLD was let through while the command started, so that the signal of a command that ended then is lost.
+    // The mask was lifted while the command started, so a command that ended at once has left no SIGCHLD to read.
     if let Some(status) = reap(child)? {
         return Ok(status);
     }

@@ -34,7 +34,7 @@ const CANNOT_RUN: u8 = 126;
 /// Exit status if the command is not found.
 const NOT_FOUND: u8 = 127;
 
-/// Runs a process inside, if the arguments of this process say that it is one. The program must call this function before it has a second thread, and before it
+/// Runs a process inside, if the arguments name a process inside. The program must call this function before it has a second thread, and before it
 /// looks at its arguments. Returns `None` in every other process.
 #[must_use]
 pub fn run() -> Option<ExitCode> {
