@@ -28,7 +28,7 @@ pub(super) struct Direction {
     /// Bytes that still reach the receiver before the cut; `None` without the fault.
     left: Option<u64>,
     slices: Option<Slices>,
-    /// Instant at which the bytes in front became writable; `None` after [`Direction::take_due`].
+    /// Instant at which the first held bytes became writable; `None` after [`Direction::take_due`].
     due: Option<Instant>,
 }
 
@@ -39,7 +39,7 @@ struct Slices {
     draws: Stream,
     /// Number of pieces drawn so far.
     drawn: u64,
-    /// Bytes of the present piece before the write; 0: none is drawn.
+    /// Size of the present piece \[bytes\]; 0 before the size of the next piece is drawn.
     present: usize,
     /// Instant before which no piece may be written.
     not_before: Instant,
@@ -108,7 +108,7 @@ impl Direction {
         if let Some(left) = &mut self.left {
             *left -= before as u64;
         }
-        // Bytes beyond the cut stay held until the close, which counts them as lost.
+        // Bytes beyond the cut stay held until the close, where held bytes are counted as lost.
         self.ready += before;
         if self.ready > 0 && self.due.is_none() {
             // Bytes that come during the gap between two pieces are due at its end.
@@ -164,7 +164,7 @@ impl Direction {
         match (self.ready, slices.not_before) {
             (0, _) => Wrote::Nothing,
             (_, at) if at > now && slices.present == 0 => {
-                // The write at `at` is late from then on, not from the arrival of the bytes on.
+                // The lateness of the next write counts from the end of the gap, not from the arrival of the bytes.
                 self.due = Some(at);
                 Wrote::At(at)
             }
@@ -172,7 +172,7 @@ impl Direction {
         }
     }
 
-    /// Returns and forgets the instant at which the bytes in front became writable.
+    /// Returns and forgets the instant at which the first held bytes became writable.
     pub(super) fn take_due(&mut self) -> Option<Instant> {
         self.due.take()
     }
@@ -202,7 +202,7 @@ impl Slices {
         let Slice { size, variation, .. } = self.law;
         let word = self.draws.packet(self.drawn).first(Purpose::Jitter);
         self.drawn += 1;
-        // The upper half of a product with a uniform word is uniform below the other factor (Lemire 2019), up to 2⁻⁶⁴ of the factor.
+        // The upper half of the product of a uniform word and a width is uniform below the width (Lemire 2019), except for a bias of at most width·2⁻⁶⁴.
         let width = u128::from(variation) * 2 + 1;
         let offset = u64::try_from((u128::from(word) * width) >> 64).unwrap_or(u64::MAX);
         size.get() - variation + offset

@@ -37,7 +37,7 @@ pub enum Event {
     Ready(ConnectionId, Side),
     /// All bytes for this end are written, and the other end has ended: no more bytes can be written to this end (`shutdown`).
     Finish(ConnectionId, Side),
-    /// A fault ends the connection: no more bytes can be written to both ends (`shutdown`). The driver reads on until [`Event::Close`].
+    /// A fault ends the connection: no more bytes can be written to either end (`shutdown`). The driver reads on until [`Event::Close`].
     FinishBoth(ConnectionId),
     /// The connection is over, and the engine has forgotten it.
     Close(ConnectionId, Close),

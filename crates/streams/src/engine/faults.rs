@@ -38,7 +38,7 @@ pub(super) fn chosen(seed: u64, proxy: &Proxy, number: u64) -> Chosen {
     Chosen { directions, timers }
 }
 
-/// Address of the draws of one connection.
+/// Seed, names and number that select the random numbers of one connection.
 struct Lot<'a> {
     seed: u64,
     proxy: &'a str,
@@ -46,8 +46,8 @@ struct Lot<'a> {
 }
 
 impl Lot<'_> {
-    /// Returns the fault if the connection has the fault. Each fault has draws of its own, without the direction: a fault in both directions has the same
-    /// connections.
+    /// Returns the fault if the connection has the fault. Each fault has random numbers of its own, which do not depend on the direction: a fault in both
+    /// directions has the same connections.
     fn hit<T: Copy>(&self, name: &str, hit: Option<Hit<T>>) -> Option<T> {
         let hit = hit?;
         let word = Stream::new(self.seed, format!("{}/{name}", self.proxy).as_bytes()).packet(self.number).first(Purpose::Loss);

@@ -58,7 +58,7 @@ enum What {
 
 /// State machine of a relay of TCP.
 ///
-/// The driver opens a connection with [`Engine::open`], hands over bytes ([`Engine::handle_bytes`]) and ends ([`Engine::handle_end`],
+/// The driver opens a connection with [`Engine::open`], passes bytes ([`Engine::handle_bytes`]) and ends ([`Engine::handle_end`],
 /// [`Engine::handle_reset`]), reads at most [`Engine::room`] bytes, and asks [`Engine::poll_timeout`] for the next deadline. After each deadline and after each
 /// input the driver calls [`Engine::handle_timeout`] with the present time and then handles [`Engine::poll_event`] until `None`. Instants never decrease.
 ///
@@ -79,9 +79,9 @@ pub struct Engine {
     arrivals: BTreeMap<(Instant, u64), (usize, Piece)>,
     /// Number of pieces that have left their lines. Orders pieces of the same instant.
     arrived: u64,
-    /// Ends for which bytes have become writable, before their event.
+    /// Ends for which bytes have become writable, and whose event is not polled yet.
     ready: BTreeSet<(ConnectionId, Side)>,
-    /// Events after those of `ready`.
+    /// Events to be polled after the events for `ready`.
     events: VecDeque<Event>,
 }
 
@@ -166,7 +166,7 @@ impl Engine {
         connection
     }
 
-    /// Returns the number of bytes that may be read from this end now. Zero: the sender has to wait.
+    /// Returns the number of bytes that may be read from this end now. At zero the sender has to wait.
     #[must_use]
     pub fn room(&self, connection: ConnectionId, from: Side) -> usize {
         let Some(found) = self.connections.get(connection) else { return 0 };
@@ -237,12 +237,12 @@ impl Engine {
         found.directions[to.other().index()].writable(now)
     }
 
-    /// Asks for an event if bytes can be written to this end. For an end that could not be written to before.
+    /// Queues [`Event::Ready`] if bytes can be written to this end. The driver calls this function when a full socket has room again.
     pub fn make_ready(&mut self, connection: ConnectionId, to: Side) {
         self.offer_writing(connection, to.other());
     }
 
-    /// Returns and forgets the instant at which the bytes of [`writable`](Self::writable) could first be written: the lateness of a write counts from there.
+    /// Returns and forgets the instant at which the bytes of [`writable`](Self::writable) could first be written, from which the lateness of a write counts.
     pub fn take_due(&mut self, connection: ConnectionId, to: Side) -> Option<Instant> {
         self.connections.get_mut(connection)?.directions[to.other().index()].take_due()
     }
@@ -287,7 +287,7 @@ impl Engine {
                 Next::Arrival(_, Piece { what: What::Bytes(_), .. }) | Next::Line(..) => false,
                 Next::Arrival(..) | Next::Timer | Next::Flush => true,
             };
-            // Whatever may end a connection waits until the bytes before it are written.
+            // An event that may end a connection waits until all bytes before the event are written.
             if is_end && let Some((connection, side)) = self.ready.pop_first() {
                 return Some(Event::Ready(connection, side));
             }
@@ -324,7 +324,7 @@ impl Engine {
         first.map_or(Next::Flush, |(_, _, next)| next)
     }
 
-    /// Takes the pieces that have left a line. A line tells of them once, also after an offer or a change at a later instant.
+    /// Takes the pieces that have left a line. A line reports each piece once, also after an offer or a change at a later instant.
     fn collect(&mut self, place: usize) {
         let line = &mut self.lines[place];
         while let Some(event) = line.link.poll_event() {
@@ -340,7 +340,7 @@ impl Engine {
 
     /// Takes a piece that has left its line.
     fn arrive(&mut self, at: Instant, place: usize, Piece { connection, what }: Piece) {
-        // Pieces of a connection that is over arrive at nobody. Their bytes were counted as lost at its end.
+        // Pieces of a connection that is over are dropped. The end of the connection has counted their bytes as lost.
         let Some(found) = self.connections.get_mut(connection).filter(|found| found.state == State::Open) else { return };
         let from = if place.is_multiple_of(2) { Side::Client } else { Side::Server };
         let direction = &mut found.directions[from.index()];
@@ -371,7 +371,7 @@ impl Engine {
         }
     }
 
-    /// Ends the stream from this side, or the connection, if all that comes before the end has been written.
+    /// Ends the stream from this side, or the connection, if all bytes before the end have been written.
     fn settle(&mut self, connection: ConnectionId, from: Side) {
         let Some(found) = self.connections.get_mut(connection).filter(|found| found.state == State::Open) else { return };
         let proxy = found.proxy;
@@ -426,7 +426,7 @@ impl Engine {
         }
     }
 
-    /// Ends both streams of a connection after what has been written. Held bytes are lost.
+    /// Ends both streams of a connection after the bytes written so far. Held bytes are lost.
     fn finish_both(&mut self, connection: ConnectionId) {
         self.drop_held(connection);
         if let Some(found) = self.connections.get_mut(connection) {

@@ -23,7 +23,7 @@ use sockets::Sockets;
 
 pub use report::{LineReport, ProxyReport, Report, View};
 
-/// Longest sleep in which arriving bytes wait: see the module.
+/// Longest sleep before a deadline, during which arriving bytes wait (see the module).
 const REST: Duration = Duration::from_micros(100);
 
 /// Distance to a deadline from which on the thread sleeps in pieces of [`REST`]: twice the resolution of the waits of mio.

@@ -18,10 +18,10 @@ use crate::engine::{Close, ConnectionId, Engine, Event, Side};
 /// Bytes read in one call of the system, at most.
 const READ: usize = 64 * 1024;
 
-/// Wait after a refusal of a descriptor: readiness of a listener is told once, and a refused client would wait for the next one.
+/// Wait after the system has refused a descriptor. Readiness of a listener is told once, so without a new attempt a client would wait for the next client.
 const AGAIN: Duration = Duration::from_millis(20);
 
-/// Readiness of so many sockets is taken in one call.
+/// Largest number of sockets whose readiness one call returns.
 const EVENTS: usize = 1024;
 
 pub(super) struct Sockets {
@@ -131,7 +131,7 @@ impl Sockets {
             // A place may have another connection since the event. Reading and writing too early does no harm.
             let Some(pair) = self.pairs.get(stream / 2).and_then(Option::as_ref) else { continue };
             let side = if stream.is_multiple_of(2) { Side::Client } else { Side::Server };
-            // An error is told by the next read.
+            // The next read returns the error.
             if event.is_readable() || event.is_error() || event.is_read_closed() {
                 self.readable.insert((pair.id, side));
             }
@@ -155,9 +155,9 @@ impl Sockets {
                 match self.listeners[place].accept() {
                     Ok((client, _)) => self.open(engine, now, place, client)?,
                     Err(error) if error.kind() == ErrorKind::WouldBlock => break,
-                    // A client that has left before its turn.
+                    // The client has left before being accepted.
                     Err(error) if matches!(error.kind(), ErrorKind::ConnectionAborted | ErrorKind::ConnectionReset | ErrorKind::Interrupted) => {}
-                    // No descriptor, or no memory: clients wait in the queue of the listener.
+                    // The system has no descriptor or no memory: clients wait in the queue of the listener.
                     Err(_) => {
                         self.waiting.insert(place);
                         self.is_short = true;
@@ -250,7 +250,7 @@ impl Sockets {
         let Some(pair) = self.pair(id) else { return };
         let place = usize::from(side == Side::Server);
         if pair.is_full[place] || (side == Side::Server && !pair.is_connected) {
-            // Whoever waits for the receiver is not late by the fault of the relay.
+            // Bytes that wait for their receiver are not late by the fault of the relay.
             engine.take_due(id, side);
             return;
         }
@@ -304,7 +304,7 @@ impl Sockets {
     fn finish(&mut self, id: ConnectionId, sides: &[Side]) {
         let Some(pair) = self.pair(id) else { return };
         for side in sides {
-            // An end that is gone already needs no end.
+            // The call fails if the other program is gone, which needs no answer.
             let _ = pair.socket(*side).shutdown(Shutdown::Write);
         }
     }
