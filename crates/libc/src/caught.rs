@@ -108,7 +108,7 @@ macro_rules! real {
 }
 pub(crate) use real;
 
-/// Returns the next definition of a function after that of this program, and keeps it in `place`. `name` ends with a zero.
+/// Returns the next definition of the function `name` after the definition of this program, and keeps the pointer in `place`. `name` ends with a zero.
 pub(crate) fn next(place: &AtomicPtr<c_void>, name: &'static str) -> *mut c_void {
     let mut found = place.load(Ordering::Relaxed);
     if found.is_null() {
@@ -118,7 +118,7 @@ pub(crate) fn next(place: &AtomicPtr<c_void>, name: &'static str) -> *mut c_void
             // Without the function nothing can be done, and a panic must not leave a function of the C library.
             std::process::abort();
         }
-        // Several threads may search at once, and find the same.
+        // Several threads may search at once, and all find the same function.
         place.store(found, Ordering::Relaxed);
     }
     found

@@ -14,7 +14,8 @@ thread_local! {
     static MINT: Cell<Option<timespec>> = const { Cell::new(None) };
 }
 
-/// Returns the instant of the standard library whose reading of the clock is 0. The standard library makes instants from readings only, so that it gets a reading.
+/// Returns the instant of the standard library whose reading of the clock is 0. The standard library makes instants only by reading the clock, so the reading
+/// is 0 for this one call.
 #[expect(clippy::disallowed_methods, reason = "the reading is one of this file")]
 fn origin() -> Instant {
     static ORIGIN: OnceLock<Instant> = OnceLock::new();
@@ -36,7 +37,7 @@ fn reading(time: Duration) -> timespec {
 /// As the function of the C library.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn clock_gettime(clock: clockid_t, to: *mut timespec) -> c_int {
-    // Read with every call: a thread that ends has the value as well, since the value needs no destructor.
+    // Taken at every call, also while a thread ends: the value needs no destructor, so an ending thread still has the value.
     let minted = MINT.take();
     if let Some(minted) = minted {
         // SAFETY: the caller promises a place for the reading.
@@ -60,7 +61,7 @@ unsafe extern "C" fn clock_gettime(clock: clockid_t, to: *mut timespec) -> c_int
     });
     served.unwrap_or_else(|| {
         let real = real!(clock_gettime: unsafe extern "C" fn(clockid_t, *mut timespec) -> c_int);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(clock, to) }
     })
 }
@@ -80,7 +81,7 @@ unsafe extern "C" fn getrandom(start: *mut c_void, length: size_t, flags: c_uint
     });
     served.unwrap_or_else(|| {
         let real = real!(getrandom: unsafe extern "C" fn(*mut c_void, size_t, c_uint) -> ssize_t);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(start, length, flags) }
     })
 }

@@ -12,7 +12,7 @@ use libc::{c_int, c_void, cmsghdr, msghdr};
 
 use crate::memory::{fail, length_of};
 
-/// Reads what the control messages of a datagram say of it.
+/// Reads the control messages of a datagram to be sent.
 ///
 /// # Safety
 ///
@@ -54,7 +54,7 @@ pub(crate) unsafe fn read(message: &msghdr) -> io::Result<Sending> {
                 let Some(from) = data.first_chunk::<16>() else { return fail(libc::EINVAL) };
                 sending.from = Some(IpAddr::from(*from));
             }
-            // Among others `UDP_SEGMENT`, which `setsockopt` does not have either.
+            // `UDP_SEGMENT` is refused too, as by `setsockopt`.
             _ => return fail(libc::EINVAL),
         }
         // SAFETY: `next` is a header within the buffer of the message.

@@ -78,7 +78,7 @@ unsafe extern "C" fn fcntl(fd: c_int, command: c_int, argument: usize) -> c_int 
     // The function of the C library is variadic, and is called so.
     let real = || {
         let real = real!(fcntl: unsafe extern "C" fn(c_int, c_int, ...) -> c_int);
-        // SAFETY: the caller's promises are those that the C library asks for, and the register has the caller's argument.
+        // SAFETY: the caller keeps the contract of the C library's function, and the register has the caller's argument.
         unsafe { real(fd, command, argument) }
     };
     match command {
@@ -109,7 +109,7 @@ unsafe extern "C" fn ioctl(fd: c_int, request: c_ulong, argument: usize) -> c_in
     });
     served.unwrap_or_else(|| {
         let real = real!(ioctl: unsafe extern "C" fn(c_int, c_ulong, ...) -> c_int);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, request, argument) }
     })
 }
@@ -151,7 +151,7 @@ unsafe extern "C" fn poll(list: *mut pollfd, length: nfds_t, timeout: c_int) -> 
         if virtual_events.iter().all(Option::is_none) {
             return None;
         }
-        // The others are asked without waiting. A negative descriptor is left out by the system.
+        // The system is asked about all other descriptors, without waiting, and leaves out negative descriptors.
         let mut others: Vec<pollfd> = list.to_vec();
         for (other, events) in others.iter_mut().zip(&virtual_events) {
             if events.is_some() {
@@ -170,6 +170,6 @@ unsafe extern "C" fn poll(list: *mut pollfd, length: nfds_t, timeout: c_int) -> 
         let what = "which would wait for a socket of the test bed, and virtual time cannot pass meanwhile: wait for the socket with tokio";
         Some(if count == 0 && timeout != 0 { calls::refuse("poll", what) } else { Ok(count) })
     });
-    // SAFETY: the caller's promises are those that the C library asks for.
+    // SAFETY: the caller keeps the contract of the C library's function.
     served.unwrap_or_else(|| unsafe { real(list, length, timeout) })
 }

@@ -97,7 +97,7 @@ pub(crate) unsafe fn write_address(from: SocketAddr, to: *mut c_void, room: sock
     length
 }
 
-/// Writes an address where the caller wants it: nowhere if `to` is null.
+/// Writes an address into the memory of the caller, or nowhere if `to` is null.
 ///
 /// # Safety
 ///

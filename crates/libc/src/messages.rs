@@ -48,7 +48,7 @@ unsafe extern "C" fn send(fd: c_int, start: *const c_void, length: size_t, flags
     });
     served.unwrap_or_else(|| {
         let real = real!(send: unsafe extern "C" fn(c_int, *const c_void, size_t, c_int) -> ssize_t);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, start, length, flags) }
     })
 }
@@ -78,7 +78,7 @@ unsafe extern "C" fn sendto(fd: c_int, start: *const c_void, length: size_t, fla
     });
     served.unwrap_or_else(|| {
         let real = real!(sendto: unsafe extern "C" fn(c_int, *const c_void, size_t, c_int, *const sockaddr, socklen_t) -> ssize_t);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, start, length, flags, to, to_length) }
     })
 }
@@ -119,7 +119,7 @@ unsafe extern "C" fn sendmsg(fd: c_int, message: *const msghdr, flags: c_int) ->
     let served = on("sendmsg", fd, |of| unsafe { send_message(of, "sendmsg", message.as_ref()?, flags) }.map(count));
     served.unwrap_or_else(|| {
         let real = real!(sendmsg: unsafe extern "C" fn(c_int, *const msghdr, c_int) -> ssize_t);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, message, flags) }
     })
 }
@@ -152,7 +152,7 @@ unsafe extern "C" fn sendmmsg(fd: c_int, messages: *mut mmsghdr, length: c_uint,
     });
     served.unwrap_or_else(|| {
         let real = real!(sendmmsg: unsafe extern "C" fn(c_int, *mut mmsghdr, c_uint, c_int) -> c_int);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, messages, length, flags) }
     })
 }
@@ -174,7 +174,7 @@ unsafe extern "C" fn recv(fd: c_int, start: *mut c_void, length: size_t, flags: 
     });
     served.unwrap_or_else(|| {
         let real = real!(recv: unsafe extern "C" fn(c_int, *mut c_void, size_t, c_int) -> ssize_t);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, start, length, flags) }
     })
 }
@@ -208,7 +208,7 @@ unsafe extern "C" fn recvfrom(
     });
     served.unwrap_or_else(|| {
         let real = real!(recvfrom: unsafe extern "C" fn(c_int, *mut c_void, size_t, c_int, *mut sockaddr, *mut socklen_t) -> ssize_t);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, start, length, flags, from, from_length) }
     })
 }
@@ -252,7 +252,7 @@ unsafe extern "C" fn recvmsg(fd: c_int, message: *mut msghdr, flags: c_int) -> s
     });
     served.unwrap_or_else(|| {
         let real = real!(recvmsg: unsafe extern "C" fn(c_int, *mut msghdr, c_int) -> ssize_t);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, message, flags) }
     })
 }
@@ -270,7 +270,7 @@ unsafe extern "C" fn recvmmsg(fd: c_int, messages: *mut mmsghdr, length: c_uint,
         }
         let mut arrived = 0;
         for index in 0..length.min(1024) as usize {
-            // The error of an empty socket, or of a refused datagram, belongs to the next call, and stays for it.
+            // The error of an empty socket, or of a refused datagram, stays for the next call.
             if arrived > 0 && !calls::ready(of).is_some_and(|ready| ready.is_ok_and(|ready| ready.readable)) {
                 break;
             }
@@ -288,7 +288,7 @@ unsafe extern "C" fn recvmmsg(fd: c_int, messages: *mut mmsghdr, length: c_uint,
     });
     served.unwrap_or_else(|| {
         let real = real!(recvmmsg: unsafe extern "C" fn(c_int, *mut mmsghdr, c_uint, c_int, *mut libc::timespec) -> c_int);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, messages, length, flags, timeout) }
     })
 }
@@ -303,7 +303,7 @@ unsafe extern "C" fn sendfile64(to: c_int, from: c_int, offset: *mut libc::off64
     let served = on("sendfile64", to, |of| calls::is_virtual(of).then(|| fail(libc::EINVAL)));
     served.unwrap_or_else(|| {
         let real = real!(sendfile64: unsafe extern "C" fn(c_int, c_int, *mut libc::off64_t, size_t) -> ssize_t);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(to, from, offset, length) }
     })
 }
@@ -325,7 +325,7 @@ unsafe extern "C" fn splice(
     let refused = |fd| on("splice", fd, |of| calls::is_virtual(of).then(|| fail(libc::EINVAL)));
     refused(from).or_else(|| refused(to)).unwrap_or_else(|| {
         let real = real!(splice: unsafe extern "C" fn(c_int, *mut libc::loff_t, c_int, *mut libc::loff_t, size_t, c_uint) -> ssize_t);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(from, from_offset, to, to_offset, length, flags) }
     })
 }
@@ -347,7 +347,7 @@ unsafe extern "C" fn read(fd: c_int, start: *mut c_void, length: size_t) -> ssiz
     });
     served.unwrap_or_else(|| {
         let real = real!(read: unsafe extern "C" fn(c_int, *mut c_void, size_t) -> ssize_t);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, start, length) }
     })
 }
@@ -372,7 +372,7 @@ unsafe extern "C" fn readv(fd: c_int, list: *const libc::iovec, length: c_int) -
     });
     served.unwrap_or_else(|| {
         let real = real!(readv: unsafe extern "C" fn(c_int, *const libc::iovec, c_int) -> ssize_t);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, list, length) }
     })
 }
@@ -391,7 +391,7 @@ unsafe extern "C" fn write(fd: c_int, start: *const c_void, length: size_t) -> s
     });
     served.unwrap_or_else(|| {
         let real = real!(write: unsafe extern "C" fn(c_int, *const c_void, size_t) -> ssize_t);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, start, length) }
     })
 }
@@ -416,7 +416,7 @@ unsafe extern "C" fn writev(fd: c_int, list: *const libc::iovec, length: c_int) 
     });
     served.unwrap_or_else(|| {
         let real = real!(writev: unsafe extern "C" fn(c_int, *const libc::iovec, c_int) -> ssize_t);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, list, length) }
     })
 }

@@ -56,7 +56,7 @@ unsafe extern "C" fn getaddrinfo(node: *const c_char, service: *const c_char, hi
             Some(io::Result::Ok(0))
         })
     });
-    // SAFETY: the caller's promises are those that the C library asks for.
+    // SAFETY: the caller keeps the contract of the C library's function.
     served.unwrap_or_else(|| unsafe { real(node, service, hints, list) })
 }
 
@@ -87,7 +87,7 @@ unsafe fn port(real: GetAddrInfo, service: *const c_char, hints: *const addrinfo
     // SAFETY: the C library has made the list, and nobody else has it.
     {
         let real = real!(freeaddrinfo: unsafe extern "C" fn(*mut addrinfo));
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(list) }
     };
     address.map(|address| address.port()).map_err(|_| libc::EAI_SERVICE)
@@ -144,10 +144,10 @@ unsafe extern "C" fn freeaddrinfo(list: *mut addrinfo) {
     // The lock is free before the C library is called, and no panic can come here.
     let is_own = OWN.lock().unwrap_or_else(PoisonError::into_inner).remove(&(list as usize));
     if !is_own {
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         {
             let real = real!(freeaddrinfo: unsafe extern "C" fn(*mut addrinfo));
-            // SAFETY: the caller's promises are those that the C library asks for.
+            // SAFETY: the caller keeps the contract of the C library's function.
             unsafe { real(list) }
         };
         return;
@@ -168,7 +168,7 @@ unsafe extern "C" fn freeaddrinfo(list: *mut addrinfo) {
 mod tests {
     use super::*;
 
-    /// Read, freed, and read in the order of the addresses: Miri and valgrind look at the memory.
+    /// A list is read in the order of the addresses and freed, under the eyes of Miri and valgrind.
     #[test]
     fn a_list_has_all_addresses_and_is_freed() {
         let addresses = ["[fd00::1]:7".parse().unwrap(), "10.0.0.1:7".parse().unwrap()];

@@ -1,4 +1,4 @@
-//! `getsockopt` and `setsockopt`. The placeholder has the options, as every socket of the system, except for those of this file.
+//! `getsockopt` and `setsockopt`. The kernel keeps the options of a placeholder, except for the options that this file names.
 
 use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr};
@@ -11,7 +11,7 @@ use crate::caught::{on, real};
 use crate::memory::{bytes, fail, length_of};
 
 /// Returns whether a test bed does not have an option: the offloads of `UDP_SEGMENT` and `UDP_GRO`, and figures of a connection in the form of Linux. Programs
-/// that ask for them do without where a system does not have them.
+/// that ask for such an option also run on systems without the option.
 fn is_missing(level: c_int, name: c_int) -> bool {
     matches!((level, name), (libc::IPPROTO_UDP, libc::UDP_SEGMENT | libc::UDP_GRO) | (libc::IPPROTO_TCP, libc::TCP_INFO))
 }
@@ -49,7 +49,7 @@ unsafe extern "C" fn getsockopt(fd: c_int, level: c_int, name: c_int, value: *mu
     });
     served.unwrap_or_else(|| {
         let real = real!(getsockopt: unsafe extern "C" fn(c_int, c_int, c_int, *mut c_void, *mut socklen_t) -> c_int);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, level, name, value, length) }
     })
 }
@@ -77,13 +77,13 @@ unsafe extern "C" fn setsockopt(fd: c_int, level: c_int, name: c_int, value: *co
             // A test bed has no devices.
             return Some(fail(libc::ENODEV));
         }
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         if unsafe { real(fd, level, name, value, length) } != 0 {
             return Some(Err(io::Error::last_os_error()));
         }
         Some(calls::option_set(of).map(|()| 0))
     });
-    // SAFETY: the caller's promises are those that the C library asks for.
+    // SAFETY: the caller keeps the contract of the C library's function.
     served.unwrap_or_else(|| unsafe { real(fd, level, name, value, length) })
 }
 
@@ -104,7 +104,7 @@ unsafe fn membership(of: Numbered<'_>, level: c_int, name: c_int, value: *const 
     // SAFETY: the caller promises the bytes.
     let value = unsafe { bytes(value, length as usize) };
     let membership = if level == libc::IPPROTO_IP {
-        // `ip_mreq`, or `ip_mreqn` with the number of an interface behind: group and address of the interface.
+        // `ip_mreq`, or `ip_mreqn` with the number of an interface at the end: group and address of the interface.
         let (Some(group), Some(interface)) = (value.first_chunk::<4>(), value.get(4..8).and_then(<[u8]>::first_chunk::<4>)) else {
             return Some(fail(libc::EINVAL));
         };

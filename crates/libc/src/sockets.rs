@@ -26,7 +26,8 @@ fn kind(domain: c_int, kind: c_int) -> Option<(Version, Type)> {
     }
 }
 
-/// See `socket(2)`. A socket of IP is a placeholder. On a thread for the blocking work of a host it is refused: it would reach the network of the system.
+/// See `socket(2)`. A socket of IP is a placeholder. On a thread for the blocking work of a host a socket of IP is refused, because the socket would
+/// reach the network of the system.
 #[unsafe(no_mangle)]
 extern "C" fn socket(domain: c_int, type_: c_int, protocol: c_int) -> c_int {
     let real = || real!(socket: extern "C" fn(c_int, c_int, c_int) -> c_int)(domain, type_, protocol);
@@ -73,7 +74,7 @@ unsafe extern "C" fn bind(fd: c_int, at: *const sockaddr, length: socklen_t) -> 
     });
     served.unwrap_or_else(|| {
         let real = real!(bind: unsafe extern "C" fn(c_int, *const sockaddr, socklen_t) -> c_int);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, at, length) }
     })
 }
@@ -105,7 +106,7 @@ unsafe extern "C" fn connect(fd: c_int, to: *const sockaddr, length: socklen_t) 
     });
     served.unwrap_or_else(|| {
         let real = real!(connect: unsafe extern "C" fn(c_int, *const sockaddr, socklen_t) -> c_int);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, to, length) }
     })
 }
@@ -140,7 +141,7 @@ unsafe extern "C" fn accept(fd: c_int, from: *mut sockaddr, length: *mut socklen
     let served = unsafe { accept_here(fd, from, length, 0) };
     served.unwrap_or_else(|| {
         let real = real!(accept: unsafe extern "C" fn(c_int, *mut sockaddr, *mut socklen_t) -> c_int);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, from, length) }
     })
 }
@@ -156,7 +157,7 @@ unsafe extern "C" fn accept4(fd: c_int, from: *mut sockaddr, length: *mut sockle
     let served = unsafe { accept_here(fd, from, length, flags) };
     served.unwrap_or_else(|| {
         let real = real!(accept4: unsafe extern "C" fn(c_int, *mut sockaddr, *mut socklen_t, c_int) -> c_int);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, from, length, flags) }
     })
 }
@@ -174,7 +175,7 @@ unsafe extern "C" fn getsockname(fd: c_int, to: *mut sockaddr, length: *mut sock
     });
     served.unwrap_or_else(|| {
         let real = real!(getsockname: unsafe extern "C" fn(c_int, *mut sockaddr, *mut socklen_t) -> c_int);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, to, length) }
     })
 }
@@ -192,7 +193,7 @@ unsafe extern "C" fn getpeername(fd: c_int, to: *mut sockaddr, length: *mut sock
     });
     served.unwrap_or_else(|| {
         let real = real!(getpeername: unsafe extern "C" fn(c_int, *mut sockaddr, *mut socklen_t) -> c_int);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(fd, to, length) }
     })
 }
@@ -212,7 +213,7 @@ extern "C" fn shutdown(fd: c_int, how: c_int) -> c_int {
     served.unwrap_or_else(|| real!(shutdown: extern "C" fn(c_int, c_int) -> c_int)(fd, how))
 }
 
-/// See `epoll_ctl(2)`. The system knows no events of a socket of a test bed, so that a program which waits for them is refused.
+/// See `epoll_ctl(2)`. A socket of a test bed is refused, because the system learns of none of its events.
 ///
 /// # Safety
 ///
@@ -226,7 +227,7 @@ unsafe extern "C" fn epoll_ctl(poll: c_int, operation: c_int, fd: c_int, event: 
     });
     refused.unwrap_or_else(|| {
         let real = real!(epoll_ctl: unsafe extern "C" fn(c_int, c_int, c_int, *mut libc::epoll_event) -> c_int);
-        // SAFETY: the caller's promises are those that the C library asks for.
+        // SAFETY: the caller keeps the contract of the C library's function.
         unsafe { real(poll, operation, fd, event) }
     })
 }
