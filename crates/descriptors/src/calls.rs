@@ -114,7 +114,7 @@ fn found(of: Numbered<'_>) -> Option<Found> {
             Virtual::Listener(held) => held.get().map(Found::Listener),
             Virtual::Datagrams(held) => held.get().map(Found::Datagrams),
             Virtual::Socket(socket) => {
-                // Only one call uses a socket before its choice between stream and listener, and most of these calls consume the socket.
+                // `connect` and `listen` consume a new socket. So the socket leaves the table for the call, and its successor is put back.
                 let version = socket.version();
                 match std::mem::replace(&mut kept.socket, Virtual::New(Type::STREAM, version)) {
                     Virtual::Socket(socket) => Some(Found::Socket(socket)),
@@ -139,6 +139,8 @@ fn note_options(of: Numbered<'_>) {
     table::with(of, |kept| kept.before = now);
 }
 
+/// Returns the test bed of this thread.
+///
 /// # Errors
 ///
 /// `EINVAL` if a descriptor is used after the end of its test bed.
@@ -386,7 +388,7 @@ fn receive_datagram(socket: &dyn Datagrams, buffers: &mut [IoSliceMut<'_>], peek
     Ok(arrived)
 }
 
-/// Takes options over that the program has set on the placeholder. To be called after the system has accepted an option.
+/// Takes over the options that the program has set on the placeholder. Must be called after the system has accepted an option.
 ///
 /// # Errors
 ///

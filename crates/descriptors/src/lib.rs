@@ -4,7 +4,7 @@
 //!
 //! A [`Placeholder`] is a real socket, neither bound nor connected, that stands for a socket of a test bed. A program sets options on the placeholder, as on any
 //! socket, and the socket of the test bed takes the options over. The inode identifies a placeholder, because duplicates of a descriptor have the same inode. All
-//! placeholders of a thread stand in one table, whoever made them: the package `tokio` that `cohaptic tokio` writes, which gives descriptors of its sockets to
+//! placeholders of a thread stand in one table, and two layers enter placeholders there: the package `tokio` that `cohaptic tokio` writes, which gives descriptors of its sockets to
 //! programs and takes descriptors back, and `cohaptic-libc`, whose functions stand in for those of the system. The module [`calls`] has these functions in a form
 //! without pointers.
 //!

@@ -1,4 +1,4 @@
-//! Placeholders for sockets of a test bed, and the way back.
+//! Placeholders for sockets of a test bed, and the way from a placeholder back to its socket.
 
 use std::io;
 use std::ops::Deref;
@@ -126,8 +126,8 @@ pub fn find<T: Kind + ?Sized>(real: OwnedFd) -> io::Result<Option<(Arc<T>, Place
     refuse_blocking(real.as_fd());
     let now = read(&SockRef::from(&real));
     set_changed(&*found, &before, now.clone())?;
-    // From now on the caller owns the socket. Duplicates of the descriptor stand for the same socket; whether any are left, only `cohaptic-libc` knows, which then
-    // counts more than one.
+    // From now on the caller owns the socket. Duplicates of the descriptor stand for the same socket. Only `cohaptic-libc` sees duplicates being made, and then
+    // counts more than one descriptor.
     let left = table::with(of, |kept| {
         kept.before.clone_from(&now);
         (kept.descriptors <= 1).then(|| std::mem::replace(&mut kept.socket, T::shared(&found)))

@@ -64,7 +64,7 @@ pub enum Virtual {
     Datagrams(Held<dyn Datagrams>),
 }
 
-/// Pointer to a socket that others may own.
+/// Pointer to a socket, with or without ownership.
 #[derive(Debug)]
 pub struct Held<T: ?Sized> {
     /// `None` if another value owns the socket, and the descriptor only finds the socket.
