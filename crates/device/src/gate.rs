@@ -91,7 +91,7 @@ pub struct Admitted {
     pub verdict: Verdict,
 }
 
-/// The only source of [`GatedForce`]s other than zero.
+/// Gate of forces, and the only source of [`GatedForce`]s other than zero.
 ///
 /// A force passes if the device is ready and armed, reading and setpoint are fresh, the loop is on time, and every number is finite. Otherwise the force is
 /// zero at once. A passed force is shortened to the largest force, and its change since the last force is shortened to the fastest change. After zero, the
@@ -146,7 +146,7 @@ impl Gate {
     /// because the calls measure the time between turns.
     pub fn admit(&mut self, wanted: [f64; 3], moment: &Moment) -> Admitted {
         let since = self.last_at.map(|last| moment.now.saturating_duration_since(last));
-        // Also for a zero force: the gap is between turns, not between forces.
+        // Noted for a zero force too, because the gap is between turns of the loop, not between forces.
         self.last_at = Some(moment.now);
         if let Some(cause) = self.zero_cause(wanted, moment, since.is_some_and(|since| since > self.limits.gap)) {
             self.withdraw();

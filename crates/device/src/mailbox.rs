@@ -6,7 +6,7 @@ use std::sync::RwLock;
 /// Attempts at a place that another thread uses.
 const TRIES: u32 = 64;
 
-/// The newest value of one writer, such as the reading of a driver's thread for the thread of a session.
+/// Newest value of one writer, such as the reading of a driver's thread for the thread of a session.
 ///
 /// No thread waits: the writer writes to a place that no reader uses, and a reader returns without a value if the newest value is being replaced at each of its
 /// attempts.
