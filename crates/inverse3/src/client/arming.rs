@@ -58,7 +58,7 @@ mod tests {
         assert!((0..=150).all(|ms| !read(&mut arming, ms, 0.020)) && !read(&mut arming, 151, 0.021));
         assert!((152..352).all(|ms| !read(&mut arming, ms, -0.020)));
         assert!(read(&mut arming, 352, 0.0));
-        // Armed, the device goes anywhere.
+        // An armed device stays armed far from the origin.
         assert!(read(&mut arming, 353, 0.1));
         assert!(arming.lose() && !arming.lose());
         assert!((354..=500).all(|ms| !read(&mut arming, ms, 0.0)));

@@ -140,7 +140,7 @@ impl Exchanges {
     /// Takes a reply. Returns the instant of the message if the reply answers the latest message; else the reply is older than the next one.
     pub(super) fn answer(&mut self, form: Form) -> Option<Instant> {
         let marked = self.outstanding.iter().position(|(_, marked)| *marked);
-        // The number of messages before the answered message. A plain reply never answers a marked message: it answers a message given up, or is a second one.
+        // Number of messages before the answered message. A plain reply never answers a marked message: such a reply is late or doubled.
         let before = match form {
             Form::Full => Some(marked.unwrap_or(0)),
             Form::Plain if marked == Some(0) => None,

@@ -33,7 +33,7 @@ pub use status::{Phase, Refusal, Snapshot};
 const LOOK: Duration = Duration::from_secs(1);
 /// Time between two looks at the list of devices, while the device is not in the list.
 const SEARCH: Duration = Duration::from_millis(100);
-/// Time after which replies count as lost, whose message went out although other replies were outstanding.
+/// Time after which the replies count as lost to messages that went out although another reply was outstanding.
 const LOST: Duration = Duration::from_millis(100);
 /// Time without any text of the service after which the connection counts as dead.
 const SILENCE: Duration = Duration::from_secs(1);
@@ -43,7 +43,7 @@ const PAUSES: [Duration; 2] = [Duration::from_millis(250), Duration::from_secs(4
 const FLAWS_IN_A_ROW: u32 = 10;
 /// Time that a stop waits for the reply to its zero force.
 const FAREWELL: Duration = Duration::from_millis(50);
-/// Error of a position that is no jump \[s\], as time at 20 m/s: replies do not arrive as evenly as they are made.
+/// Tolerance before a change of position counts as a jump, as time at 20 m/s: replies arrive less evenly than the service makes replies.
 const JITTER: Duration = Duration::from_millis(1);
 
 /// Step that the owner of a client carries out.
@@ -81,7 +81,7 @@ struct Known {
     is_placed: bool,
     /// Mounting at the look that made the origin certain.
     mount: Option<Value>,
-    /// `true` if the latest look found the axes as they were.
+    /// `true` if the latest look found the axes unchanged.
     is_straight: bool,
     /// Instant of the latest look at the configuration.
     looked: Option<Instant>,
@@ -263,7 +263,7 @@ impl Client {
         } else {
             self.flaws_in_a_row = 0;
         }
-        // A first message asks for the preset; later messages carry a force that waited for the reply.
+        // The first message asks for the preset. Later a force may have waited for the reply.
         if !self.exchanges.is_outstanding() && self.device_is_there() && (self.is_pending || self.known.asked.is_none()) {
             self.message(now);
         }

@@ -8,7 +8,7 @@ use crate::axes::{length, to_scene};
 use crate::protocol::{Config, Device, FASTEST, Flaw, Format, Kinematics, PRESET};
 
 impl Client {
-    /// Takes the own device of a list of devices, and returns the flaw of its state. `answered`: instant of the latest message, if the list answers that.
+    /// Takes the own device of a list of devices, and returns the flaw of its state. `answered`: instant of the latest message, if the list is the reply to this message.
     pub(super) fn take(&mut self, now: Instant, own: Option<&Device>, answered: Option<Instant>) -> Option<Flaw> {
         self.is_listed = own.is_some();
         let Some(device) = own else {
@@ -85,7 +85,7 @@ impl Client {
             return self.leave();
         }
         self.known.is_placed = true;
-        // A connection that works ends the search for one.
+        // A connection that works ends the search for a connection.
         self.pause = PAUSES[0];
     }
 
@@ -105,7 +105,7 @@ impl Client {
         let plain = |vector| to_scene(vector).map(|part| part + 0.0);
         let position = plain(core::array::from_fn(|axis| position[axis] - origin[axis]));
         let reading = Reading { position, velocity: plain(velocity) };
-        // When the service read the device is not known: the age counts from the message, at which the device had not been read yet.
+        // The instant at which the service read the device is unknown. The age counts from the message, because the service reads the device later.
         self.reading = Some((reading, sent));
         self.exchanges.note(now, sent, force.map(to_scene), self.config.exchange);
         if self.may_arm() {

@@ -1,6 +1,6 @@
 //! Messages between a program and Haply's Inverse Service: JSON in text frames of a WebSocket.
 //!
-//! The forms are those of Haply's documentation 3.5 and of the crate `haply` 1.3.1. Programs tell versions before 3.5 from later versions by [`Version`], and
+//! The forms come from Haply's documentation 3.5 and of the crate `haply` 1.3.1. Programs tell versions before 3.5 from later versions by [`Version`], and
 //! differ in the words of [`Format`].
 
 mod event;

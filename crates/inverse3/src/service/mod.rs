@@ -32,7 +32,7 @@ const LATE: Duration = Duration::from_millis(20);
 const JUMP: f64 = 0.05;
 /// Time without a force after which the device idles. Made up: the time of the real device is not published.
 const IDLE: Duration = Duration::from_millis(100);
-/// Id of the device that takes the place of a renamed one.
+/// Id of the device while the fault `Renamed` holds.
 const OTHER: &str = "0BAD";
 
 /// Frame of the service to a program.
@@ -178,7 +178,7 @@ impl Service {
         self.observed.messages += 1;
         let Some(request) = Request::read(text, self.config.format) else {
             self.observed.unreadable += 1;
-            // A message is answered, whatever it says.
+            // Every message is answered, also an unreadable one.
             return self.reply(session, false);
         };
         let is_own = request.device.is_some() && request.device.as_deref() == self.device();
@@ -251,7 +251,7 @@ impl Service {
     }
 
     fn move_to(&mut self, now: Instant) {
-        // Two parts, because the motors let go in between.
+        // Two steps, because the force of the motors ends in between.
         let idle = self.force.1.saturating_add(IDLE);
         if self.now <= idle && idle < now {
             self.grip.advance(idle, self.motor_force(), &mut *self.hand);

@@ -20,7 +20,7 @@ use crate::stepped::NAME;
 
 /// Longest wait of the thread, after which the thread looks for a stop.
 const LONGEST_WAIT: Duration = Duration::from_millis(20);
-/// Time between two summaries. A summary takes some 10 µs, and only people read it.
+/// Time between two summaries. A summary takes some 10 µs and is for people, who read slowly.
 const SUMMARY: Duration = Duration::from_millis(100);
 
 /// Memory shared by the device and its thread.

@@ -1,4 +1,4 @@
-//! Sockets of this machine. Times are asserted nowhere: a machine may be as slow as it likes.
+//! Sockets of this machine. No test asserts a time, because a machine may be slow.
 
 use std::io::{Read as _, Write as _};
 use std::net::{Ipv4Addr, TcpStream};
