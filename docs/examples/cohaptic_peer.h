@@ -292,7 +292,7 @@ static inline int cohaptic_decode(const cohaptic_session *session, const uint8_t
     return finite;
 }
 
-/* One joining in a session with a key: first the nonce, then the keys of both directions. */
+/* Joining of a session with a key: first the nonce, then the keys of both directions. */
 typedef struct {
     uint8_t nonce[COHAPTIC_NONCE], to_door[COHAPTIC_KEY], to_peer[COHAPTIC_KEY];
 } cohaptic_joining;

@@ -178,7 +178,7 @@ fn fresh(kind: Type, version: Version) -> io::Result<socket2::Socket> {
         Version::Six => Domain::IPV6,
     };
     let real = socket2::Socket::new(domain, kind, None)?;
-    // As with the sockets of tokio.
+    // The sockets of tokio do not block either.
     real.set_nonblocking(true)?;
     Ok(real)
 }

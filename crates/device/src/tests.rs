@@ -88,7 +88,7 @@ fn the_first_cause_counts() {
     let asked = Moment { setpoint_at: Some(late), ..read };
     let mut found = Vec::new();
     for moment in [broken, ready, armed, read, asked] {
-        // Each gate has paused as long: the gate of this test is asked once alone.
+        // Each moment has a gate of its own, so that every gate has paused equally long.
         let mut paused = Gate::new(*gate.limits(), Stopper::default()).unwrap();
         paused.admit([0.0; 3], &well(at(0)));
         found.push(cause(paused.admit([f64::NAN; 3], &moment)));

@@ -90,7 +90,7 @@ pub struct Sending {
 /// every thread but the thread of the run.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
 pub trait Datagrams: Configured + fmt::Debug + Send + Sync {
-    /// Hands the next datagram to `take`. The datagram stays in the buffer if `peek` is set.
+    /// Calls `take` with the next datagram. The datagram stays in the buffer if `peek` is set.
     fn poll_receive(&self, cx: &mut Context<'_>, peek: bool, take: &mut dyn FnMut(Received<'_>)) -> Poll<io::Result<()>>;
     /// Like [`Datagrams::poll_receive`], but does not wait.
     fn try_receive(&self, peek: bool, take: &mut dyn FnMut(Received<'_>)) -> io::Result<()>;

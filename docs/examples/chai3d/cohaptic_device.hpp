@@ -101,7 +101,7 @@ class cCohapticDevice : public chai3d::cGenericHapticDevice {
         return m_deviceReady && m_error.empty();
     }
 
-    // Why the session was not joined, or why the device has left it. Empty while all is well.
+    // Returns the reason why the session was not joined, or why the device has left the session. Empty while all is well.
     std::string error() {
         const std::lock_guard<std::mutex> guard(m_lock);
         return m_error;

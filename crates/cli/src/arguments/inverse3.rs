@@ -28,7 +28,7 @@ pub(crate) enum Inverse3Command {
     Simulate(Inverse3SimulateArguments),
 }
 
-/// Which device.
+/// Selection of a device and of its service.
 #[derive(Debug, Args)]
 pub(crate) struct WhichInverse3 {
     /// Address of Haply's Inverse Service on this machine

@@ -51,7 +51,7 @@ pub(crate) fn join(arguments: &JoinArguments) -> Result<ExitCode, Failure> {
         length,
     };
     let joined = Joined { scene: &theirs, place, session: arguments.session, device: arguments.device, identity, is_keyed };
-    // Before the device, which a person would have to home in vain.
+    // The scene is checked before the device is opened, so that nobody homes a device for a scene that is then refused.
     Join::check(&scene, place, &config).map_err(|error| refused(error, &joined))?;
     let Some((device, facts)) = open_device(arguments, &scene, place)? else { return Ok(ExitCode::from(INTERRUPTED)) };
     let join = Join::open(&scene, place, config, device).map_err(|error| refused(error, &joined))?;

@@ -41,7 +41,7 @@ impl Setup {
 
     fn of_file(arguments: &RelayArguments, path: &Path) -> Result<Self, Failure> {
         let mut overrides = arguments.set.clone();
-        // Options of their own come after all `--set`, so that they win over `--set` and over the file.
+        // Single options such as `--seed` come after all `--set`, and so override `--set` and the file.
         let mut lay = |key: &str, value: Option<String>| overrides.extend(value.map(|value| format!("relay.{key}={value}")));
         lay("seed", arguments.seed.map(|seed| seed.to_string()));
         lay("most-bytes", arguments.bytes.map(|bytes| format!("\"{}B\"", bytes.get())));

@@ -285,7 +285,7 @@ fn the_status_is_that_of_the_command() {
     let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
     child.stdin.take().unwrap().write_all(b"words").unwrap();
     assert_eq!(Outcome::of(child.wait_with_output().unwrap()).stdout, "WORDS");
-    // What the command leaves in the background ends with it, and the pipe with both.
+    // A background process ends with its command. The pipe of the output then closes, or this call would time out.
     assert_eq!(desk.cohaptic_within(PATIENCE, "exec 'delay 1ms' -- sh -c 'sleep 1000 & exit 3'").status, Some(3));
 }
 

@@ -87,7 +87,7 @@ fn a_probe_and_rows_of_a_simulated_device() {
     let rows = desk.cohaptic("inverse3 watch --simulated --for 500ms --csv cursor.csv");
     assert_eq!(rows.status, Some(0), "{}", rows.stderr);
     assert!(rows.stdout.starts_with("t,phase,x,y,z,vx,vy,vz,fx,fy,fz\n0.0"), "{}", rows.stdout);
-    // What to do is said beside the rows.
+    // Standard error tells the user what to do.
     assert!(rows.stderr.contains("hold the cursor still at the origin"), "{}", rows.stderr);
     assert!(desk.read("cursor.csv").lines().count() > 2);
     let watch = document(&desk, "inverse3 watch --simulated --spring 50 --for 500ms --json");

@@ -160,7 +160,7 @@ fn a_wrong_key_scene_place_or_kind_is_a_sentence() {
         &["no welcome from 127.0.0.1:", "Possible reasons: no session listens there", "another one than --key-file", "its scene is another one"];
     let with_other_key = join("--for 2.5s --peer left --key-file other.key");
     with_other_key.assert_refused(3, no_welcome);
-    // After two seconds the reasons are listed while it goes on asking, and once more as the error at its end.
+    // After two seconds `join` lists the reasons and goes on asking. The error at the end lists the reasons again.
     assert_eq!(with_other_key.stderr.matches("Possible reasons").count(), 2, "{}", with_other_key.stderr);
     join(&format!("{left} --for 300ms --set link.delay=25ms")).assert_refused(3, no_welcome);
     let other = session.said("127.0.0.1:");
@@ -168,7 +168,7 @@ fn a_wrong_key_scene_place_or_kind_is_a_sentence() {
     // The length of this peer's part is its own.
     let joined = join(&format!("{left} --for 300ms"));
     assert_eq!(joined.status, Some(0), "{}", joined.stderr);
-    // Without a key nobody hears it, and of the possible reasons the key is one.
+    // A session with a key does not answer a `join` without a key, and the key is among the possible reasons.
     join("--peer left --for 300ms").assert_refused(3, &["nothing from 127.0.0.1:", "it has a key, which --key-file must name here, too"]);
 
     join("--peer third --key-file session.key").assert_refused(2, &["--peer third: ", "lab.toml has no such peer: expected left"]);

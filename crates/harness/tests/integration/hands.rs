@@ -142,7 +142,7 @@ fn a_device_takes_hold_and_lets_go_little_by_little() {
         let bound = COUPLING * ((0.05 + x0.abs().max(x.abs()) + 0.1) / 250.0 + (x - x0).abs());
         assert!((f - f0).abs() <= bound + 1e-9, "tick {tick}, at {at}: from {f0} N to {f} N");
     }
-    // What is felt is what was computed, at the tick at which it was, as far as the gate admits it. A hand without a device feels nothing.
+    // The hand feels the force that was computed, at the same tick, as far as the gate admits the force. A hand without a device feels nothing.
     let there = |t: u64| (300..1000).contains(&t) || (1200..1900).contains(&t);
     felt(&held, |t| there(t).then(|| forces.computed(t)));
     assert!(held.iter().any(|(_, [x, ..])| (x - FORCE).abs() < 1e-9) && held.iter().any(|(_, [x, ..])| (x + FORCE).abs() < 1e-9));

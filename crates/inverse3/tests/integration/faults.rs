@@ -18,7 +18,7 @@ const END: u64 = 4000;
 /// Force that is asked for \[N\], along x. The hand, a spring of 100 N/m, gives way by 5 mm, and so arms the device again.
 const ASKED: f64 = 0.5;
 
-/// One tick: the true force of the motors along x at the end \[N\], the force of the latest message, and the phase.
+/// Row of a tick: the true force of the motors along x at the end \[N\], the force of the latest message, and the phase.
 #[derive(Clone, Copy, Debug)]
 struct Row {
     motors: f64,

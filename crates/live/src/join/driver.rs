@@ -130,7 +130,7 @@ enum EndedBy {
 
 /// Receive buffer of the socket \[byte\], as in a session.
 const RECEIVE_BUFFER: usize = 1 << 20;
-/// Longest datagram handed on by the socket \[byte\]: longer than the longest datagram of the protocol, because a shorter buffer would cut a datagram.
+/// Length of the buffer for a received datagram \[byte\]: longer than the longest datagram of the protocol, because a shorter buffer would cut a datagram.
 const LARGEST: usize = 2048;
 /// Time between two looks.
 const LOOK: Duration = Duration::from_millis(20);

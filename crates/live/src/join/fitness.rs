@@ -20,7 +20,7 @@ pub enum Unfit {
          another strategy, such as average-position"
     )]
     Extrapolated,
-    /// Not every peer sends to every other peer.
+    /// The topology leaves out some pairs of peers.
     #[error("in a live session every peer sends to every other: expected a scene without [topology], or kind = \"full\"")]
     Topology,
     /// The hand is a modelled person.

@@ -50,7 +50,7 @@ impl Others {
         Self { ages: Ages::default(), elsewhere: elsewhere.collect() }
     }
 
-    /// Hands a sample received at `at` to the peer, at the tick at `now`. Both instants are in time since tick 0.
+    /// Passes a sample received at `at` to the peer, at the tick at `now`. Both instants are in time since tick 0.
     pub(super) fn take_in(
         &mut self,
         now: Instant,

@@ -65,7 +65,7 @@ static void driven() {
         place(*stub, 0.001, true);
         CHECK(comes([&] { return reads() && read == COHAPTIC_READ; }));
         CHECK(cohaptic_now() - near_from >= 200000000);
-        // Once armed, the grip may go where it likes.
+        // An armed grip may be anywhere.
         place(*stub, 0.050, true);
         CHECK(comes([&] { return reads() && state.position[2] == 0.050; }) && read == COHAPTIC_READ);
         // A device that does not answer gives no readings, and is armed anew.

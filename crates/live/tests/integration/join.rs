@@ -106,7 +106,7 @@ fn joined(overrides: &[&str], millis: u64) -> Rows {
     let (mut rows, mut own) = (Rows::default(), BTreeMap::new());
     for half in 0..=2 * millis {
         let now = at(500 * half);
-        // Twice: the welcome makes tick 0 due at once.
+        // A welcome makes tick 0 due at the same instant, so datagrams are passed twice.
         for _ in 0..2 {
             for datagram in pass(&mut left, now, &mut |row| {
                 own.insert((row.peer, row.at), numbers(row));

@@ -81,7 +81,7 @@ fn a_reset_reaches_the_other_end_after_the_delay_and_so_does_no_byte_after() {
     assert_eq!(driver.engine.counts(0).unwrap().reset, 1);
 }
 
-/// A driver that is late hands over bytes at an instant at which others have left the line already.
+/// A late driver passes bytes at an instant at which earlier bytes have already left the line.
 #[test]
 fn bytes_that_left_the_line_before_a_late_input_are_told() {
     for keys in ["delay=10ms", "delay=10ms rate=8Mbit"] {

@@ -136,7 +136,7 @@ fn the_seed_chooses_the_share_of_connections_with_a_fault() {
     // A fault of both directions has the same connections, and so has a second run.
     assert_eq!(chosen, reset(1, "10%"));
     assert_ne!(chosen, reset(2, "10%"));
-    // Whoever is hit with a smaller chance is hit with a larger one.
+    // Every connection that is hit with a smaller probability is hit with a larger probability too.
     assert!(chosen.iter().zip(reset(1, "30%")).all(|(small, large)| large || !small));
     assert!(reset(1, "100%").iter().all(|hit| *hit) && !reset(1, "0%").contains(&true));
 }

@@ -40,7 +40,7 @@ fn at(ms: u64) -> Instant {
     Instant::ZERO + Duration::from_millis(ms)
 }
 
-/// What an end of a connection sees, with the instant.
+/// Bytes or end that an end of a connection receives, with the instant.
 #[derive(Clone, PartialEq, Eq, Debug)]
 enum Seen {
     Bytes(Instant, Vec<u8>),

@@ -158,7 +158,7 @@ fn a_study_of_a_moving_target_has_a_dry_run() {
     assert!(folder.play_dry(&NoWatch).unwrap());
     let analysis = folder.analysis().unwrap();
     assert_eq!((analysis.units, analysis.measures[0].name.as_str(), analysis.measures[0].rows.len()), (2, "peers.left.error_rms_m", 2));
-    // Who sees the target 100 ms later follows less exactly than who sees the target at once, and nobody stays away from the target.
+    // A person who sees the target 100 ms later follows less exactly than a person who sees the target at once, and nobody stays away from the target.
     assert!(analysis.measures[0].means.iter().all(|mean| (1e-4..0.014).contains(&mean.mean)), "{:?}", analysis.measures[0].means);
     assert!(folder.verify().unwrap().differences.is_empty());
     assert_eq!(folder.power(2, &NoWatch).unwrap().unwrap().times, 2);

@@ -82,7 +82,7 @@ impl Core {
 
     /// Leaves all groups of a closed socket.
     pub(super) fn leave_all(&mut self, state: &SocketState) {
-        // The death of a host ends all memberships. New sockets may have joined the same groups since.
+        // A crash of the host ends all memberships. New sockets may have joined the same groups since.
         for group in state.multicast.iter().filter(|_| state.died.is_none()).flat_map(|multicast| &multicast.groups) {
             self.forget_membership(state.host, *group);
         }

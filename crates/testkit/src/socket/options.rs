@@ -217,7 +217,7 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// Those of Linux: `EINVAL` if `group` is no multicast address, `ENODEV` if the host does not have the address `interface`, `EADDRINUSE` if the socket has
+    /// As on Linux: `EINVAL` if `group` is no multicast address, `ENODEV` if the host does not have the address `interface`, `EADDRINUSE` if the socket has
     /// joined the group already.
     pub fn join_multicast_v4(&self, group: Ipv4Addr, interface: Ipv4Addr) -> io::Result<()> {
         self.open(|core| core.join_group(self.id, group, interface))?

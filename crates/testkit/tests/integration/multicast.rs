@@ -28,7 +28,7 @@ fn a_group_reaches_its_members_with_one_copy_a_link() {
             assert_eq!((from.to_string(), bed.now().as_nanos()), ("10.0.0.1:5353".to_owned(), 10_000_000));
             assert!(hears(&c).await && !hears(&d).await && !hears(&a).await);
             assert_eq!(["b", "c", "d"].map(|host| bed.link_stats("a", host).delivered()), [1, 1, 0]);
-            // Who answers sends to one.
+            // An answer goes to the sender alone.
             b.send_to(b"!", from).await.unwrap();
             assert!(hears(&a).await && !hears(&c).await);
             b.leave_multicast_v4(GROUP, ANY).unwrap();
@@ -67,7 +67,7 @@ fn a_membership_is_that_of_the_host_and_ends_with_the_socket() {
         let hearing = host.bind("0.0.0.0:5353").unwrap();
         a.send_to(b"?", TO).await.unwrap();
         assert!(!hears(&hearing).await);
-        // The handle of the dead socket takes no membership of the living one along.
+        // Dropping the handle of the crashed socket ends no membership of the new socket.
         hearing.join_multicast_v4(GROUP, ANY).unwrap();
         drop(bound);
         a.send_to(b"?", TO).await.unwrap();

@@ -93,7 +93,7 @@ impl Core {
         }
     }
 
-    /// Hands a segment to its link.
+    /// Offers a segment to its link.
     #[inline]
     fn emit_on(&mut self, path: Path, addresses: Ends, connection: Option<ConnId>, segment: Segment<'static>) {
         // The entry is made before the offer, which takes the segment, and noted after the offer, so that the trace has the sending first.

@@ -1,4 +1,4 @@
-//! Which NATs let two hosts talk that learn of each other from a third one (Ford, Srisuresh and Kegel 2005).
+//! Pairs of NATs through which two hosts can talk after a third host has told each host the address of the other (Ford, Srisuresh and Kegel 2005).
 
 use std::net::SocketAddr;
 use std::time::Duration;

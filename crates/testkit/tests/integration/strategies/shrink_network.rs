@@ -166,7 +166,7 @@ fn nats_go_first_and_those_that_stay_become_more_open() {
         let shrunk: Vec<ImpairedNetwork> =
             (0..200).filter_map(|seed| shrink(&any_network(3).behind_nats([0, 2]), seed, fails)).map(|shrunk| shrunk.least).collect();
         assert!(shrunk.len() > 10 && shrunk.contains(&ImpairedNetwork::words(words)), "{words}: {shrunk:?}");
-        // Where one of two hosts must have a NAT that is not open, either may be the one.
+        // A case in which one of two hosts must have a NAT that is not open can end with either host behind the NAT.
         assert!(words.contains("address") || shrunk.iter().all(|least| *least == ImpairedNetwork::words(words)), "{words}");
         assert!(shrunk.iter().all(|least| least.stages() == 0));
     }
