@@ -60,7 +60,7 @@ typedef size_t cohaptic_len; /* of a buffer, as send() takes it */
 #define COHAPTIC_NO_SOCKET (-1)
 #endif
 
-/* Largest number of peers of a scene. Define a larger one before the header is included, if a scene has more. */
+/* Largest number of peers of a scene. Define a larger number before the header is included, if a scene has more. */
 #ifndef COHAPTIC_MAX_PEERS
 #define COHAPTIC_MAX_PEERS 64
 #endif
@@ -460,7 +460,7 @@ enum {
     COHAPTIC_SILENCE = 1000000000     /* without anything new from anybody for so long, the peer begins anew [ns] */
 };
 
-/* Sample held from another peer: the one with the highest number, the initial state before the first. */
+/* Sample held from another peer: the sample with the highest number, or the initial state before the first sample. */
 typedef struct {
     cohaptic_state state;
     cohaptic_matrix matrix; /* of its attitude */
@@ -751,7 +751,7 @@ typedef struct {
     int64_t reading_at, setpoint_at; /* [ns], or COHAPTIC_NEVER */
 } cohaptic_moment;
 
-/* The only way of a force to a device. After zero, a force grows from zero at most as fast as `slew` allows. */
+/* Gate, which every force to a device passes. After zero, a force grows from zero at most as fast as `slew` allows. */
 typedef struct {
     cohaptic_limits limits;
     double last[3];
@@ -947,8 +947,8 @@ static inline void cohaptic_send(cohaptic_client *client, const uint8_t *bytes, 
     if (len > 0 && send(client->socket, (const char *)bytes, (cohaptic_len)len, 0) < 0) return;
 }
 
-/* Receives a datagram into a buffer larger than any of the protocol, so that a longer one is not cut to a valid one. Returns its length, or -1 if none is
- * there. */
+/* Receives a datagram into a buffer larger than any datagram of the protocol, so that a longer datagram is not cut to a valid datagram. Returns the length
+ * of the datagram, or -1 if no datagram is there. */
 static inline long cohaptic_receive(cohaptic_client *client, uint8_t out[2048]) {
     int tries;
     for (tries = 0; tries < 8; ++tries) {
@@ -959,7 +959,7 @@ static inline long cohaptic_receive(cohaptic_client *client, uint8_t out[2048]) 
 #else
         if (errno == EAGAIN || errno == EWOULDBLOCK) return -1;
 #endif
-        /* Otherwise the system tells that an earlier datagram found nobody, or a signal came: ask again. */
+        /* Any other error reports an earlier datagram that found nobody, or a signal: ask again. */
     }
     return -1;
 }
@@ -1188,7 +1188,7 @@ static inline const char *cohaptic_run(cohaptic_client *client, const cohaptic_d
             const int finite = isfinite(state.position[0]) && isfinite(state.position[1]) && isfinite(state.position[2]) && isfinite(state.velocity[0]) &&
                                isfinite(state.velocity[1]) && isfinite(state.velocity[2]);
             if (read != COHAPTIC_READ_NOTHING) moment.ready = read != COHAPTIC_READ_NOT_READY, moment.armed = read == COHAPTIC_READ;
-            /* A reading that cannot be used leaves the one before in force, which grows old. */
+            /* A reading that cannot be used has no effect: the reading before stays, and grows old. */
             if (read != COHAPTIC_READ_NOTHING && moment.ready && finite) moment.reading_at = moment.now;
             else state = peer->read_before;
             device_is_felt = moment.ready && moment.armed && cohaptic_is_fresh(moment.now, moment.reading_at, client->gate.limits.reading_age_ns);
@@ -1197,7 +1197,7 @@ static inline const char *cohaptic_run(cohaptic_client *client, const cohaptic_d
         peer->weight = device_is_felt ? fmin(1, peer->weight + per_tick) : fmax(0, peer->weight - per_tick);
         cohaptic_peer_tick(peer, k, &state, NULL);
         client->ticks = k + 1;
-        /* Nobody is felt in a session that is silent: no force is asked for then. */
+        /* In a silent session no force is asked for, because no other peer can be felt. */
         if (!cohaptic_peer_is_in_silence(peer, moment.now)) moment.setpoint_at = moment.now;
         if (exchanges) {
             cohaptic_gate_admit(&client->gate, peer->on_hand, &moment, force);

@@ -98,7 +98,7 @@ pub fn run(data: &[u8]) {
         }
         desk.act();
     }
-    // At every end zero goes out, and nothing else.
+    // A stop sends zero force after any input.
     desk.client.stop(desk.now);
     desk.act();
     desk.pass(desk.now + Duration::from_millis(60));

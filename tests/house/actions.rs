@@ -41,7 +41,7 @@ impl Yaml {
             }
             assert_eq!(deep, indent, "an indentation that nothing has opened: {line}");
             if let Some(element) = content.strip_prefix("- ") {
-                // The first key of an element stands two columns behind the dash, as its other keys do.
+                // The first key of an element stands two columns after the dash, as all keys of the element do.
                 let same = " ".repeat(deep + 2) + element;
                 let mut own: Vec<&str> = lines.to_vec();
                 own[*at] = &same;
@@ -57,7 +57,7 @@ impl Yaml {
         if list.is_empty() { Self::Map(map) } else { Self::List(list) }
     }
 
-    /// Reads what stands behind a key or a dash, and the lines below that belong to it.
+    /// Reads the value after a key or a dash, with the lines below that belong to the value.
     fn scalar(lines: &[&str], at: &mut usize, value: &str, deep: usize) -> Self {
         *at += 1;
         let below = |at: usize| lines.get(at).map(|line| (line.trim().is_empty(), line.len() - line.trim_start().len()));
@@ -113,7 +113,7 @@ impl Yaml {
     }
 }
 
-/// Splits a line into a key and the text behind its colon.
+/// Splits a line into a key and the text after the colon.
 fn split(line: &str) -> Option<(String, &str)> {
     let (key, value) = line.strip_suffix(':').map(|key| (key, "")).or_else(|| line.split_once(": "))?;
     let key = key.trim_matches('"');
@@ -145,7 +145,7 @@ fn commands() -> BTreeSet<String> {
     found
 }
 
-/// Returns the words behind `cohaptic` in a script, where the program is called.
+/// Returns the words after `cohaptic` in each call of the program in a script.
 fn called(script: &str) -> Vec<&str> {
     let calls = script.lines().flat_map(|line| line.split(['|', ';', '&', '(']));
     calls.filter_map(|call| call.trim_start().strip_prefix("cohaptic ")).filter_map(|rest| rest.split_whitespace().next()).collect()

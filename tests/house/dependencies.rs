@@ -79,7 +79,7 @@ fn a_feature_that_is_off_compiles_nothing() {
     assert!(added("tokio-net").contains(&"mio".to_owned()));
 }
 
-/// Somebody who tests networks waits for no driver of a device.
+/// A build for tests of networks compiles no driver of a device.
 #[test]
 fn the_program_without_drivers_compiles_none() {
     let (all, without) = (compiled("cohaptic-cli", &[]), compiled("cohaptic-cli", &["--no-default-features"]));

@@ -1,4 +1,4 @@
-//! Two programs learn of each other from a meeting point, and call each other. Behind which NATs do they hear each other?
+//! Two programs learn each other's address from a meeting point, and call each other. The table shows behind which NATs both programs hear each other.
 //!
 //! ```text
 //! cargo run -p cohaptic-testkit --example through_a_nat

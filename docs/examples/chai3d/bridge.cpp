@@ -124,7 +124,7 @@ static cohaptic_gains gainsOf(const std::string &text) {
     return gains;
 }
 
-// Reads the command line. `door`, `key_file` and `label` of the result point into it.
+// Reads the command line. `door`, `key_file` and `label` of the result point into the command line.
 static cohaptic_options parse(int argc, char **argv, double &duration) {
     cohaptic_options options = cohaptic_usual();
     options.session.axes = 3, options.label = "chai3d";

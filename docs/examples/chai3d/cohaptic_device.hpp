@@ -60,7 +60,7 @@ class cCohapticDevice : public chai3d::cGenericHapticDevice {
             cohaptic_close(&m_client);
             return chai3d::C_ERROR;
         }
-        // Forces of a program may change as fast as they like: nobody holds the copy in a hand. Size, age and pauses are checked as for any device.
+        // Forces of a program may change at any rate, because nobody holds the copy in a hand. Size, age and pauses are checked as for any device.
         m_client.gate.limits.slew = 1e6;
         m_options.session = m_client.peer.session;
         setStiffness();

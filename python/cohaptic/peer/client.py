@@ -60,7 +60,7 @@ class Client:
                     continue
                 datagram = self.receive()
                 if datagram is None:
-                    # The system reports that the hello before found nobody.
+                    # The error belongs to the hello before, which found nobody.
                     time.sleep(0.01)
                 elif told := joining.handle_welcome(datagram):
                     return told

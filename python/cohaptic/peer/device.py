@@ -217,7 +217,7 @@ class _Loop:
         peer.weight = grew(peer.weight, self.ready and self.armed and is_read, self.per_tick)
         peer.tick(k, states)
         self.k += 1
-        # Nobody is felt in a session that is silent: no force is asked for then.
+        # In a silent session no force is asked for, because no other peer can be felt.
         if not peer.is_in_silence(now):
             self.setpoint_at = now
         if peer.exchanges(k):
@@ -270,7 +270,7 @@ class _End:
         self._is_over = True
         self.gate.stop()
         try:
-            # The device may be why the loop ends, and then cannot take a force any more.
+            # The loop may end because of a fault of the device, which then takes no force any more.
             with contextlib.suppress(Exception):
                 self.device.push([0.0, 0.0, 0.0])
         finally:

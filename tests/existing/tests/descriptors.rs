@@ -161,7 +161,7 @@ fn listeners_and_datagrams_go_through_the_standard_library() {
     });
 }
 
-/// Closing the last descriptor closes the connection, and not an earlier one.
+/// Closing the last descriptor closes the connection; closing an earlier descriptor does not.
 #[test]
 fn a_connection_whose_placeholder_is_dropped_is_closed() {
     let program = async |bed: Bed| {

@@ -49,7 +49,7 @@ fn try_exec(arguments: &ExecArguments) -> Result<u8, Failure> {
 fn print(plan: &Plan, line: Line<'_>) {
     // One call writes the whole line, so that lines of several hosts do not mix.
     let text = [plan.hosts[line.host].name.as_bytes(), b" | ", line.bytes, b"\n"].concat();
-    // A reader that is gone does not keep the commands from their end.
+    // The commands run on to their end even if nobody reads the output any more, so a failed write is ignored.
     let _ = match line.stream {
         Stream::Output => io::stdout().lock().write_all(&text).and_then(|()| io::stdout().flush()),
         Stream::Error => io::stderr().lock().write_all(&text),

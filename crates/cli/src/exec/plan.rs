@@ -34,7 +34,7 @@ pub(super) fn plan(arguments: &ExecArguments) -> Result<Plan, Failure> {
     }
 }
 
-/// Returns the plan of a command between which and the real world lies the link.
+/// Returns the plan of a single command, with the link between the command and the real world.
 fn of_command(arguments: &ExecArguments) -> Result<Plan, Failure> {
     let there = link(&arguments.spec)?;
     let back = arguments.back.as_ref().map_or_else(|| Ok(there.clone()), |words| link(std::slice::from_ref(words)))?;
@@ -93,7 +93,7 @@ fn gateway(arguments: &ExecArguments, name: &str) -> GatewayPlan {
     GatewayPlan { name: name.to_owned(), name_server: arguments.dns.or_else(cohaptic_exec::name_server), listen: Vec::new() }
 }
 
-/// Returns the plan with what the options say for all kinds.
+/// Returns the plan with the options that a single command and a file share.
 fn whole(arguments: &ExecArguments, hosts: Vec<HostPlan>, gateway: Option<GatewayPlan>, links: LinkTable) -> Plan {
     Plan {
         seed: arguments.seed.unwrap_or(0),

@@ -264,7 +264,7 @@ fn standing_in(version: &str, real: &Table, beside: &Beside) -> String {
                 own.push(format!("dep:{package}"));
             }
         }
-        // Descriptors are those of sockets.
+        // Only sockets have descriptors here, so the packages for descriptors come with the feature of sockets.
         if name == "net" {
             own.extend(["cohaptic-descriptors", "cohaptic-libc"].map(|package| format!("dep:{package}")));
         }

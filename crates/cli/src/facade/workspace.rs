@@ -71,8 +71,8 @@ impl Workspace {
                 sim.display()
             )));
         }
-        // The feature `libc` is a default feature of the test kit and names no code of it: features add, and calls of the system are to be caught unless somebody
-        // says no.
+        // The feature `libc` of the test kit is a default feature without code, so that calls of the system are caught unless a workspace leaves the default
+        // features out. A feature that switches the calls off would not do, because cargo adds up the features of all dependents.
         let catches_calls = kit["uses_default_features"] != false || has_feature(kit, "libc");
         let beside =
             Beside { sockets: source(kit, "../sockets")?, descriptors: source(kit, "../descriptors")?, libc: source(kit, "../libc")?, catches_calls };

@@ -55,7 +55,7 @@ pub(super) fn run(which: &WhichInverse3, limit: f64, most: Option<Duration>, tas
         StartError::Remote(_) | StartError::Config(_) => Failure::Input(error.to_string()),
         StartError::Listen(..) | StartError::Thread(_) | _ => Failure::System(error.to_string()),
     };
-    // Dropped after the device, which says farewell to the service.
+    // Dropped after the device, because the device sends a last zero force to the service.
     let simulated = if which.simulated {
         let service = Service::new(ServiceConfig::default(), SWAY);
         Some(ServiceThread::start(service, SocketAddr::from((Ipv4Addr::LOCALHOST, 0))).map_err(failed)?)

@@ -57,7 +57,7 @@ pub(super) fn watch(arguments: &Inverse3WatchArguments) -> Result<ExitCode, Fail
         exchanges: Exchanges::of(&summary.report, PERIOD),
         files,
     };
-    // Rows on standard output leave no room for the answer: a reader of rows would stumble over words.
+    // Rows on standard output leave no room for the answer: a program that reads rows would not understand words.
     if arguments.which.json {
         output::json(DocumentSchema::INVERSE3_WATCH, &document)?;
     } else {

@@ -1,4 +1,4 @@
-//! Devices in people's hands: opens the devices of a scene, makes the devices ready, and hands each to the session.
+//! Devices in people's hands: opens the devices of a scene, makes the devices ready, and passes each to the session.
 
 use std::path::Path;
 

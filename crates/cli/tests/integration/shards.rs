@@ -122,7 +122,7 @@ fn while_anything_is_missing_a_merge_says_what_and_by_which_shard_it_is_done() {
         let status = desk.text(&format!("{line} --status {out}"));
         assert!(status.starts_with(&format!("{out}: 8 of 8 {piece}s are done, ")), "{status}");
         assert!(status.ends_with("all is done and put together\n"), "{status}");
-        // The result of another scene is none of this one.
+        // The result of another scene is no result of this scene.
         if piece != "part" {
             let status = desk.text(&format!("{line} --set link.delay=3ms --status {out}"));
             assert!(status.starts_with(&format!("{out}: 0 of 8 {piece}s are done, ")), "{status}");

@@ -130,7 +130,7 @@ impl<const A: usize> Device for FalconDevice<A> {
     }
 
     fn read(&mut self, now: Instant) -> Option<Reading> {
-        // Without a snapshot at this call, because the thread is replacing it, the one before counts.
+        // While the thread replaces the snapshot, the snapshot before counts.
         if let Some(snapshot) = self.snapshot() {
             // A repeated time stamp is a repeated snapshot, and keeps the instant of the first appearance.
             let came = self.newest.filter(|(newest, _)| newest.at == snapshot.at).map_or(now, |(_, came)| came);

@@ -117,7 +117,7 @@ pub struct Admitted {
     pub verdict: Verdict,
 }
 
-/// Gate of a Falcon: the [`Gate`] of every device, and the torques of the force that it admits.
+/// Gate of a Falcon: the [`Gate`] of every device, and the torques of each admitted force.
 ///
 /// A force passes if the [`Gate`] admits it, and if torques can make the force at the position of the grip. The torques are lowered if a motor would exceed its
 /// limit.

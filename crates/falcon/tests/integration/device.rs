@@ -27,7 +27,7 @@ fn stepped<const A: usize>(axes: [Axis; A]) -> (SteppedFalcon<SimulatedTransport
     (falcon, simulator)
 }
 
-/// Returns a wanted force on the hand \[N\] as a gate admits it that has asked for the force before: unchanged.
+/// Returns the wanted force on the hand \[N\] as an admitted force. The gate has admitted the same force long enough to leave the force unchanged.
 fn admitted(force: [f64; 3]) -> GatedForce {
     let mut gate = Gate::new(Limits { force: 20.0, slew: 1e6, ..Limits::DEFAULT }, Stopper::default()).unwrap();
     let [_, second] = [0, 1].map(|millis| {

@@ -43,7 +43,7 @@ pub struct ExecFile {
     pub seed: u64,
     /// Lateness above which a packet is late.
     pub tolerance: Duration,
-    /// Hosts, in the order of their start. With [`ExecFile::world`] at least one, else at least two.
+    /// Hosts, in the order of their start. At least one host with [`ExecFile::world`], otherwise at least two.
     pub hosts: Vec<ExecHost>,
     /// Name of the real world in links, or `None` if the hosts reach only each other.
     pub world: Option<String>,
@@ -60,7 +60,7 @@ pub struct ExecHost {
     pub command: Vec<String>,
     /// `true` if the run ends with this command, and has its status.
     pub is_main: bool,
-    /// Text in a line of the command's output from which on the next host may start. `None`: the next host starts at once.
+    /// Text in a line of the command's output after which the next host may start. `None`: the next host starts at once.
     pub ready: Option<String>,
 }
 

@@ -33,7 +33,7 @@ pub fn stream_of_keys(keys: &LinkKeys, folder: &Path, reader: FileReader<'_>) ->
 
 /// Reads the keys of a stream. Returns `None` after a reported fault.
 pub(crate) fn read_stream(node: &Node, context: Context<'_>) -> Option<StreamConfig> {
-    // Keys of a link that a stream cannot have are no unknown keys: their user is told why and what to do.
+    // Keys of a link that a stream cannot have do not count as unknown keys: the message says why a stream cannot have the key, and what to do.
     let is_refused = |name: &str| STREAM.key(name).is_none().then(|| LINK_TABLE.key(name)).flatten();
     let refused: Vec<(&Entry, Refused)> =
         node.as_table().map_or(&[][..], |table| &table.0).iter().filter_map(|entry| Some((entry, Refused(is_refused(&entry.name)?.name)))).collect();

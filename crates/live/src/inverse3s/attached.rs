@@ -13,7 +13,7 @@ use crate::scene_hand::Beginning;
 /// Driven Inverse3, and the service of a simulated Inverse3.
 #[derive(Debug)]
 pub(super) struct Attached {
-    // Dropped first: the driver says farewell to the service.
+    // Dropped first, because the driver sends a last zero force to the service.
     device: Inverse3,
     simulated: Option<(ServiceThread, Beginning)>,
 }

@@ -1,4 +1,4 @@
-//! Inverse3s of a scene: starts the drivers, and hands each Inverse3 to the session as the device of a peer.
+//! Inverse3s of a scene: starts the drivers, and passes each Inverse3 to the session as the device of a peer.
 //!
 //! A real Inverse3 is behind Haply's service, which need not run yet: the device joins the session when its user has armed the device. A simulated Inverse3
 //! (`inverse3 = { device = "simulated" }`) has a service of its own at a free port of this machine, speaks the same messages, and is held by the peer's hand of

@@ -34,7 +34,7 @@ pub struct SessionConfig {
     /// Keys and files of the scene, from [`cohaptic_scene::scene_content`], kept in the record. A replay with another scene names the differing keys and files.
     /// With empty content, a replay can only say that the scenes differ.
     pub content: SceneContent,
-    /// Fingerprint to which those of hellos are compared: a peer with another one is not answered. `None`: the fingerprint of the scene. A session that was
+    /// Fingerprint that hellos must have: a hello with another fingerprint is not answered. `None`: the fingerprint of the scene. A session that was
     /// made shorter or longer than the scene says has the fingerprint of the scene as written here, so that peers need not know the length of the session.
     pub identity: Option<Fingerprint>,
 }

@@ -1,4 +1,4 @@
-//! Reader of the files of `tests/reference` with twelve digits, whose scenes have radii and boundaries: see the README there.
+//! Reader of the files of `tests/reference` with twelve digits, whose scenes have radii and boundaries. The README of that folder describes the format.
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::{Family, FamilyScratch, KeyRange, Method, Verdict, analyse};

@@ -22,7 +22,7 @@ fn lost(driver: &Driver) -> u64 {
 #[test]
 fn close_after_ends_both_streams_and_the_bytes_on_their_way_are_lost() {
     let (driver, connection) = sent("delay=2ms close-after=10ms", 2000);
-    // Bytes of 0 to 7 ms arrive before 10 ms. Those of 8 and 9 ms are on the line, and later ones find nobody.
+    // Bytes of 0 to 7 ms arrive before 10 ms. Bytes of 8 and 9 ms are still on the line, and later bytes reach nobody.
     assert_eq!(driver.bytes(connection, Side::Server), (0..=7).flat_map(|ms| [ms; 10]).collect::<Vec<u8>>());
     assert_eq!(driver.seen(connection, Side::Server).last(), Some(&Seen::Finish(at(10))));
     assert_eq!(driver.seen(connection, Side::Client), [Seen::Finish(at(10)), Seen::Closed(at(1010))]);

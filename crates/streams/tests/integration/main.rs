@@ -52,7 +52,7 @@ enum Seen {
 /// Driver in virtual time, whose ends take all bytes at once.
 struct Driver {
     engine: Engine,
-    /// Each thing seen, with its connection and its end. A close and a reset are seen at the client's end.
+    /// Each event seen, with the connection and the end. A close and a reset are noted at the client's end.
     seen: Vec<(ConnectionId, Side, Seen)>,
 }
 
@@ -61,7 +61,7 @@ impl Driver {
         Self { engine: Engine::new(config), seen: Vec::new() }
     }
 
-    /// Lets everything happen up to `until`, each thing at its instant.
+    /// Handles all deadlines up to `until`, each at its instant.
     fn run(&mut self, until: Instant) {
         while let Some(due) = self.engine.poll_timeout().filter(|due| *due <= until) {
             self.at(due);

@@ -59,7 +59,7 @@ fn a_membership_is_that_of_the_host_and_ends_with_the_socket() {
         a.send_to(b"?", "b:5353").await.unwrap();
         a.send_to(b"?", TO).await.unwrap();
         assert!(hears(&bound).await && !hears(&bound).await);
-        // The group is no source: who sends from the socket sends from the address of the host.
+        // The group is no source: datagrams from the socket have the address of the host.
         bound.send_to(b"!", a.local_addr().map(|to| ("a", to.port())).unwrap()).await.unwrap();
         assert_eq!(a.recv_from(&mut [0; 8]).await.unwrap().1.to_string(), "10.0.0.2:5353");
         host.crash();

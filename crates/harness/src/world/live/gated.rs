@@ -92,7 +92,7 @@ impl GatedDevice {
 
     /// Ends the force of the session for good.
     pub fn stop(&mut self, now: Instant) {
-        // Zero force first: a device without a thread has nobody else to send it.
+        // Zero force goes out before the stop, because a device without a thread sends nothing afterwards.
         self.device.hold(now, Duration::ZERO, GatedForce::ZERO);
         self.gate.stop();
         self.device.stop();

@@ -130,7 +130,7 @@ fn the_message_that_nobody_listens_passes_the_nat() {
             inside.send(b"?").await.unwrap();
             time::sleep(Duration::from_millis(1)).await;
             assert_eq!(inside.send(b"?").await.unwrap_err().kind(), std::io::ErrorKind::ConnectionRefused);
-            // And out of it: a socket inside is gone when the answer comes.
+            // The same from inside: a socket inside is closed when the answer comes.
             let server = bind(&bed.host("server"), "0.0.0.0:7");
             inside.connect("server:7").await.unwrap();
             inside.send(b"?").await.unwrap();

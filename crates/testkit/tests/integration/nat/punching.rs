@@ -67,7 +67,7 @@ fn hosts_meet_through_the_nats_of_the_table() {
     let kinds = ["none", "open", "address", "cgnat", "home", "strict"];
     for (place, one) in kinds.into_iter().enumerate() {
         for other in &kinds[place..] {
-            // The filter of the one side must permit the port that the other side's mapping for it has.
+            // The filter of one side must permit the port of the other side's mapping.
             let expected = !matches!((one, *other), ("home" | "strict", "strict"));
             for kinds in [[one, *other], [*other, one]] {
                 for seed in 0..3 {
