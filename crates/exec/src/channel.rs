@@ -21,7 +21,7 @@ pub(crate) struct Channel {
 /// Message from inside.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) enum Report {
-    /// The descriptor that comes with the message is the device. The number tells its offloads.
+    /// The descriptor of the message is the device. The number tells the offloads of the device.
     Device(u8),
     /// The command runs.
     Started,
@@ -34,7 +34,7 @@ pub(crate) enum Report {
 /// Message to the inside.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Order {
-    /// Start the command. The descriptor that comes with the message is its standard input.
+    /// Start the command, with the descriptor of the message as its standard input.
     Start,
     /// Send the signal with this number to the command.
     Signal(u8),
@@ -50,7 +50,7 @@ impl Channel {
         Ok((Self { socket: one }, Self { socket: other }))
     }
 
-    /// Returns the end that this process has got as its standard input.
+    /// Returns the end of a channel given to this process as standard input.
     pub(crate) fn of_standard_input() -> io::Result<Self> {
         Ok(Self { socket: io::stdin().as_fd().try_clone_to_owned()? })
     }
@@ -81,7 +81,7 @@ impl Channel {
         }
     }
 
-    /// Waits for a report, and returns the report with its descriptor. Returns `None` if the other process has ended.
+    /// Waits for a report, and returns the report with the descriptor. Returns `None` if the other process has ended.
     pub(crate) fn next_report(&self) -> io::Result<Option<(Report, Option<OwnedFd>)>> {
         let Some((bytes, descriptor)) = self.receive()? else { return Ok(None) };
         let report = match bytes.as_slice() {
@@ -94,7 +94,7 @@ impl Channel {
         Ok(Some((report, descriptor)))
     }
 
-    /// Waits for an order, and returns the order with its descriptor. Returns `None` if the other process has ended.
+    /// Waits for an order, and returns the order with the descriptor. Returns `None` if the other process has ended.
     pub(crate) fn next_order(&self) -> io::Result<Option<(Order, Option<OwnedFd>)>> {
         let Some((bytes, descriptor)) = self.receive()? else { return Ok(None) };
         let order = match bytes.as_slice() {
@@ -124,12 +124,12 @@ impl Channel {
             match recvmsg(&self.socket, &mut [IoSliceMut::new(&mut bytes)], &mut control, RecvFlags::CMSG_CLOEXEC) {
                 Ok(received) => break received,
                 Err(rustix::io::Errno::INTR) => {}
-                // A process that was killed with unread orders resets the socket.
+                // The socket of a process killed with unread orders is reset.
                 Err(rustix::io::Errno::CONNRESET) => return Ok(None),
                 Err(error) => return Err(error.into()),
             }
         };
-        // No message is empty, so zero bytes mean that the other end is closed.
+        // No message is empty, so zero bytes mean the end of the channel.
         if received.bytes == 0 {
             return Ok(None);
         }

@@ -22,11 +22,11 @@ pub struct Exchange {
     gateway: Option<NodeId>,
     /// Latest instant given by the driver.
     now: Instant,
-    /// Latest instant up to which the cross packets of all links are computed.
+    /// Instant up to which the cross packets of all links are computed.
     caught_up: Instant,
-    /// Links that have cross-traffic.
+    /// Links with cross-traffic.
     with_cross: Vec<Path>,
-    /// Packets inside the links, indexed by sender. Signed, because the end of a copy can be reported before its making.
+    /// Packets inside the links, indexed by sender. Signed, because the end of a copy can be reported before the making of the copy.
     held: Vec<i64>,
     /// Bytes of IP inside the links.
     held_bytes: i64,
@@ -37,13 +37,13 @@ pub struct Exchange {
 /// Host of an [`Exchange`].
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Node {
-    /// Name, unique in the network. Names of links and random streams are made of it.
+    /// Name, unique in the network. Part of the names of links and random streams.
     pub name: String,
     /// Addresses of the host.
     pub addresses: Vec<IpAddr>,
 }
 
-/// Packet that leaves a link.
+/// Packet at the end of its link.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Departure {
     /// Logical departure.
@@ -54,12 +54,12 @@ pub struct Departure {
     pub packet: Arc<Packet>,
 }
 
-/// Packets that no link has taken, by reason.
+/// Packets not taken by any link, by reason.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Counts {
-    /// Packets that are not IP, or whose headers contradict their length.
+    /// Packets other than IP, and packets with headers that contradict the length.
     pub malformed: u64,
-    /// Packets to an address that no other host has, such as the multicast groups to which systems send by themselves.
+    /// Packets to an address of no host, for example to a multicast group, as systems send by themselves.
     pub no_host: u64,
     /// Packets dropped because too much was inside the links.
     pub overload: u64,
@@ -69,7 +69,7 @@ pub struct Counts {
 const MOST_PACKETS: i64 = 262_144;
 const MOST_BYTES: i64 = 256 << 20;
 
-/// Time after which cross packets are computed without a packet that meets them, as in [`cohaptic_router::Engine`].
+/// Time after which cross packets are computed without a packet to meet the cross packets, as in [`cohaptic_router::Engine`].
 const CATCH_UP: Duration = Duration::from_millis(10);
 
 impl Exchange {
@@ -152,13 +152,13 @@ impl Exchange {
         self.network.poll_timeout()
     }
 
-    /// Returns the next packet that leaves, in the order of instants, or `None` when all have been polled.
+    /// Returns the next departing packet, in the order of instants, or `None` when all have been polled.
     #[must_use]
     pub fn poll_departure(&mut self) -> Option<Departure> {
         self.departures.pop_front()
     }
 
-    /// Collects the events of the links: deliveries become departures, and each packet that ends frees room.
+    /// Collects the events of the links: deliveries become departures, and each end of a packet frees room.
     fn drain(&mut self) {
         while let Some(event) = self.network.poll_event() {
             let (from, bytes) = (usize::from(event.path.from.0), i64::try_from(event.size.get()).unwrap_or(i64::MAX));
@@ -168,7 +168,7 @@ impl Exchange {
             let Fate::Delivered(at) = event.fate else { continue };
             let PacketEvent { record, payload: mut packet, damage, part: _ } = event;
             if record.marked || damage.is_some() {
-                // A copy may share the packet. `make_mut` then clones the packet, so that the copy keeps its own marks and bits.
+                // A copy may share the packet. `make_mut` then clones the packet, so that each copy has separate marks and bits.
                 let packet = Arc::make_mut(&mut packet);
                 if record.marked {
                     packet.mark_congestion();
@@ -181,7 +181,7 @@ impl Exchange {
         }
     }
 
-    /// Returns the number of packets of a host that are inside its links.
+    /// Returns the number of packets of a host inside links.
     #[must_use]
     pub fn in_flight(&self, from: NodeId) -> u64 {
         self.held.get(usize::from(from.0)).map_or(0, |held| u64::try_from(*held).unwrap_or(0))
@@ -199,13 +199,13 @@ impl Exchange {
         self.network.link_stats(from, to)
     }
 
-    /// Returns the numbers of packets that no link has taken.
+    /// Returns the numbers of packets not taken by any link.
     #[must_use]
     pub const fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// Returns the bytes of IP that are inside the links.
+    /// Returns the bytes of IP inside the links.
     #[must_use]
     pub fn held_bytes(&self) -> Bytes {
         Bytes::new(u64::try_from(self.held_bytes).unwrap_or(0))

@@ -21,7 +21,7 @@ pub(crate) struct Host {
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("{why}")]
 pub struct Failed {
-    /// Exit status: 125 for a failure of this program, 126 for a command that cannot be executed, 127 for a command that is not found.
+    /// Exit status: 125 for a failure of this program, 126 if the command cannot be executed, 127 if the command is not found.
     pub status: u8,
     /// Reason, in words.
     pub why: String,
@@ -62,7 +62,7 @@ impl Host {
         }
     }
 
-    /// Lets the command begin. `reads`: the command has the standard input of this program; otherwise its input is empty.
+    /// Lets the command begin. `reads`: the command has the standard input of this program; otherwise the input is empty.
     pub(crate) fn start(&self, reads: bool) -> io::Result<()> {
         if reads {
             self.channel.order(Order::Start, Some(io::stdin().as_fd()))

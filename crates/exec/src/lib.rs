@@ -1,4 +1,4 @@
-//! Programs in network namespaces of their own, whose traffic passes emulated links, without root.
+//! Programs in separate network namespaces, with traffic over emulated links, without root.
 //!
 //! Use this crate if your own program starts programs in any language on an emulated network. The crate needs Linux.
 //!

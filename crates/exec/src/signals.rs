@@ -14,7 +14,7 @@ use nix::sys::signalfd::SignalFd;
 /// Time in which a signal to a group reaches all processes of the group: the system signals one process after the other, within microseconds.
 pub(crate) const GROUP: Duration = Duration::from_millis(5);
 
-/// Signal that was read.
+/// A read signal.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Got {
     pub(crate) signal: Signal,
@@ -22,14 +22,14 @@ pub(crate) struct Got {
     pub(crate) is_of_terminal: bool,
 }
 
-/// Returns the signals that are passed on to the command.
+/// Returns the signals to be passed on to the command.
 pub(crate) fn passed_on() -> SigSet {
     [Signal::SIGHUP, Signal::SIGINT, Signal::SIGQUIT, Signal::SIGTERM, Signal::SIGUSR1, Signal::SIGUSR2].into_iter().collect()
 }
 
 /// Reads the next signal.
 pub(crate) fn read(signals: &SignalFd) -> io::Result<Option<Got>> {
-    /// `SI_KERNEL`: the kernel has sent the signal, which for these signals means a terminal.
+    /// `SI_KERNEL`: the kernel has sent the signal. The kernel sends the passed-on signals for a terminal only.
     const OF_KERNEL: i32 = 0x80;
     let Some(info) = signals.read_signal()? else { return Ok(None) };
     let number = i32::try_from(info.ssi_signo).map_err(io::Error::other)?;

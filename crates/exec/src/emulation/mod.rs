@@ -33,11 +33,11 @@ pub(crate) struct Emulation {
     release: Lateness,
     /// Packets of the current read; empty between reads.
     incoming: Vec<Packet>,
-    /// Packets that have left their links, indexed by receiver.
+    /// Packets at the end of their links, indexed by receiver.
     leaving: Vec<Leaving>,
-    /// Packets that a device did not take, indexed by node.
+    /// Packets refused by a device, indexed by node.
     refused: Vec<u64>,
-    /// Capture of each host that has one, indexed by node.
+    /// Captures of hosts, indexed by node; `None` without a capture.
     captures: Vec<Option<Capture>>,
     /// First error of a capture. The run goes on without the captures.
     capture_error: Option<io::Error>,
@@ -45,7 +45,7 @@ pub(crate) struct Emulation {
     is_read_out: bool,
 }
 
-/// Writer of the packets that a host sends and receives.
+/// Writer of the packets from and to a host.
 pub(crate) type Capture = CaptureWriter<BufWriter<File>>;
 
 /// End of the network at a host.
@@ -98,14 +98,14 @@ impl Emulation {
     ///
     /// # Errors
     ///
-    /// The error of a device, or of the system if it refuses to wait.
+    /// The error of a device, or of the wait for packets.
     pub(crate) fn run(&mut self, pacing: Pacing) -> io::Result<()> {
         /// Time between two checks whether the last data has arrived.
         const LOOK: Duration = Duration::from_millis(50);
         drive(self, &Schedule { pacing, end: None, look_every: LOOK }, |_, _| ControlFlow::Continue(()))
     }
 
-    /// Returns whether all that the hosts have sent has arrived.
+    /// Returns whether all data of the hosts has arrived.
     fn is_delivered(&self) -> bool {
         self.is_read_out
             && self.ports.iter().enumerate().all(|(node, port)| match port {
@@ -126,7 +126,7 @@ impl Emulation {
         self.clock.now()
     }
 
-    /// Returns the numbers of packets that the device of each node, or the gateway, did not take.
+    /// Returns the numbers of packets refused by the device of each node, or by the gateway.
     pub(crate) fn refused(&self) -> impl Iterator<Item = u64> {
         self.refused.iter().zip(&self.ports).map(|(refused, port)| match port {
             Port::Device(_) => *refused,
@@ -181,7 +181,7 @@ impl Emulation {
         }
     }
 
-    /// Writes the packets that have left their links to the receiver `node`. Returns the number of packets.
+    /// Writes the packets at the end of their links to the receiver `node`. Returns the number of packets.
     fn deliver(&mut self, node: usize) -> u64 {
         let Leaving { packets, at } = &mut self.leaving[node];
         let count = packets.len() as u64;
@@ -190,7 +190,7 @@ impl Emulation {
                 let mut rest = packets.as_slice();
                 let mut at = at.drain(..);
                 while !rest.is_empty() {
-                    // Lateness is measured before the call, which writes all packets of the group at once.
+                    // Lateness is measured before the call, because one call writes all packets of the group.
                     let now = self.clock.now();
                     let (done, sent) = device.send(rest);
                     // At least one packet is settled by each call, so that the loop ends.
@@ -216,7 +216,7 @@ impl Driven for Emulation {
     type Clock = MonotonicClock;
     type Error = io::Error;
 
-    /// A packet that arrives while a departure is made ready is read late by up to this time.
+    /// While a departure is made ready, an arriving packet is read late by up to this time.
     const AHEAD: Option<Duration> = Some(READING);
     const RESTS: bool = false;
 
@@ -238,7 +238,7 @@ impl Driven for Emulation {
         if self.stop.is_wished() {
             self.woken = None;
         }
-        // A packet counts from its reading, so that departures that are late already leave first, as in the router.
+        // A packet counts from its reading, so departures already late leave first, as in the router.
         if self.poll_timeout().is_some_and(|due| now.saturating_duration_since(due) >= READING) {
             self.handle_timeout(now);
             self.send();
@@ -296,7 +296,7 @@ impl Driven for Emulation {
         false
     }
 
-    /// Writes all packets that have left their links to their receivers. An answer of the gateway over a link without delay leaves in the same call.
+    /// Writes all packets at the end of their links to the receivers. An answer of the gateway over a link without delay leaves in the same call.
     fn send(&mut self) -> u64 {
         let mut sent = 0;
         loop {

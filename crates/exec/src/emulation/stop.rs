@@ -34,7 +34,7 @@ impl Stop {
         self.wish.load(Ordering::Acquire) != Self::GO_ON
     }
 
-    /// Returns whether the run has to end. `is_delivered` says whether all that the hosts have sent has arrived.
+    /// Returns whether the run has to end. `is_delivered`: whether all data of the hosts has arrived.
     pub(super) fn is_over(&self, is_delivered: impl FnOnce() -> bool) -> bool {
         match self.wish.load(Ordering::Acquire) {
             Self::GO_ON => false,
@@ -43,7 +43,7 @@ impl Stop {
         }
     }
 
-    /// Ends the run when all that the hosts have sent has arrived beyond the gateway, and at the latest after [`LAST`].
+    /// Ends the run when all data of the hosts has arrived beyond the gateway, and at the latest after [`LAST`].
     pub(crate) fn finish(&self) {
         self.end.store(self.clock.now().saturating_add(LAST).as_nanos(), Ordering::Relaxed);
         self.wish(Self::FINISH);
@@ -57,10 +57,10 @@ impl Stop {
     fn wish(&self, wish: u8) {
         // Release publishes `end`, stored before, to a loop that sees the wish. The wake-up comes last: a woken loop finds the wish.
         self.wish.fetch_max(wish, Ordering::Release);
-        // A loop that has ended does not read the pipe any more.
+        // An ended loop does not read the pipe any more.
         let _ = (&self.wakes).write_all(b"w");
     }
 }
 
-/// Time after the end of the commands in which their last data still crosses the links.
+/// Time after the end of the commands for the last data on the links.
 const LAST: Duration = Duration::from_secs(10);

@@ -1,4 +1,4 @@
-//! Addresses that a program sees, and the real addresses for which these stand.
+//! Addresses in the view of a program, and the corresponding real addresses.
 
 use core::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
@@ -10,9 +10,9 @@ pub const fn host(index: u8) -> [IpAddr; 2] {
 
 /// Addresses of the first host.
 pub(super) const HOST: [IpAddr; 2] = host(0);
-/// Addresses of the gateway, which stand for the loopback interface of the real machine.
+/// Addresses of the gateway, in place of the loopback interface of the real machine.
 pub const GATEWAY: [IpAddr; 2] = [v4(2), v6(2)];
-/// Addresses of the name server, which stand for the name server of the real machine.
+/// Addresses of the name server, in place of the name server of the real machine.
 pub const NAMES: [IpAddr; 2] = [v4(3), v6(3)];
 /// Bits of the network in the addresses above, as \[IPv4, IPv6\].
 pub const PREFIX: [u8; 2] = [24, 64];
@@ -20,7 +20,7 @@ pub const PREFIX: [u8; 2] = [24, 64];
 /// Port of name servers.
 pub const DNS: u16 = 53;
 
-/// Returns an address of the network 10.0.2.0/24, which `slirp` gives to virtual machines too.
+/// Returns an address of the network 10.0.2.0/24, as `slirp` gives to virtual machines too.
 const fn v4(last: u8) -> IpAddr {
     IpAddr::V4(Ipv4Addr::new(10, 0, 2, last))
 }

@@ -1,4 +1,4 @@
-//! Datagrams that the program inside sends in fragments, put together again.
+//! Datagrams in fragments from the program inside, put together again.
 
 use core::net::IpAddr;
 use core::time::Duration;
@@ -10,10 +10,10 @@ use cohaptic_units::Instant;
 /// Time for which fragments wait for missing fragments (RFC 8200, section 4.5, asks for 60 s; Linux has 30 s).
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Largest number of packets that wait for fragments. A further packet takes the place of the packet that has waited longest.
+/// Largest number of packets in wait for fragments. A further packet takes the place of the packet with the longest wait.
 const MOST: usize = 64;
 
-/// Packets of which fragments have arrived.
+/// Packets with at least one arrived fragment.
 #[derive(Debug, Default)]
 pub(super) struct Fragments {
     waiting: BTreeMap<Key, Parts>,
@@ -56,7 +56,7 @@ impl Fragments {
 }
 
 impl Parts {
-    /// Returns the data of the packet, or `None` while a part is missing. Parts that overlap never make a whole (RFC 5722).
+    /// Returns the data of the packet, or `None` while a part is missing. Overlapping parts never make a whole (RFC 5722).
     fn whole(&self) -> Option<Vec<u8>> {
         let length = self.length?;
         let mut whole = Vec::with_capacity(length);
@@ -87,7 +87,7 @@ mod tests {
             assert_eq!(taken[2].as_ref().unwrap().datagram_data(), Some(data.as_slice()));
             assert!(fragments.waiting.is_empty());
         }
-        // A fragment that comes twice, and a fragment that comes too late.
+        // A repeated fragment, and a late fragment.
         let mut fragments = Fragments::default();
         for (seconds, place) in [(0, 0), (1, 1), (1, 1), (31, 2)] {
             assert!(fragments.take(at(seconds), &parts[place]).is_none());

@@ -44,7 +44,7 @@ pub struct Gateway {
     fragments: Fragments,
     /// Latest instant given by the driver.
     now: Instant,
-    /// Packets of kinds that the gateway does not pass on, and damaged packets.
+    /// Damaged packets, and packets of kinds without a way through the gateway.
     dropped: u64,
 }
 
@@ -64,18 +64,18 @@ enum Owner {
     Listener(usize),
     /// Flow of UDP from inside.
     Udp(Ends),
-    /// Port of UDP that leads inside, by its index.
+    /// Port of UDP with a way inside, by its index.
     Port(usize),
 }
 
-/// Real sockets with their events, and the parts that the tables of TCP and UDP share: packets to the program inside, and memory.
+/// Real sockets with their events, and the shared parts of the tables of TCP and UDP: packets to the program inside, and memory.
 #[derive(Debug)]
 struct Sockets {
     epoll: OwnedFd,
     /// Owners of the sockets, by token. A token is never used again, so that a late event finds no wrong owner.
     owners: BTreeMap<u64, Owner>,
     next_token: u64,
-    /// Identification of the latest datagram that may have been cut.
+    /// Identification of the latest datagram from outside.
     identification: u32,
     /// Name server of the machine.
     names: Option<SocketAddr>,
@@ -101,7 +101,7 @@ impl Sockets {
     }
 }
 
-/// Returns the reason for which an error of the system says that a destination is unreachable, or `None` for any other error.
+/// Returns the reason if an error of the system reports an unreachable destination, or `None` for all remaining errors.
 fn unreachable(error: &io::Error) -> Option<Unreachable> {
     const REASONS: [(io::ErrorKind, Unreachable); 3] = [
         (io::ErrorKind::NetworkUnreachable, Unreachable::Network),
@@ -112,7 +112,7 @@ fn unreachable(error: &io::Error) -> Option<Unreachable> {
 }
 
 impl Gateway {
-    /// Returns a gateway without flows. `names` is the name server of the machine, to which questions go.
+    /// Returns a gateway without flows. `names` is the name server of the machine.
     ///
     /// # Errors
     ///
@@ -130,17 +130,17 @@ impl Gateway {
         Ok(Self { sockets, tcp: TcpTable::default(), udp: UdpTable::default(), fragments: Fragments::default(), now: Instant::ZERO, dropped: 0 })
     }
 
-    /// Leads connections and datagrams that arrive at `address` of the real machine to the same port of the host inside.
+    /// Leads connections and datagrams from `address` of the real machine to the same port of the host inside.
     ///
     /// # Errors
     ///
-    /// If the address is not one of this machine, or its port is taken.
+    /// If this machine does not have the address, or the port is taken.
     pub fn listen(&mut self, address: SocketAddr) -> io::Result<()> {
         self.tcp.listen(&mut self.sockets, address)?;
         self.udp.listen(&mut self.sockets, address)
     }
 
-    /// Returns a descriptor that is readable when a socket has an event.
+    /// Returns a descriptor, readable when a socket has an event.
     #[must_use]
     pub fn readable(&self) -> BorrowedFd<'_> {
         self.sockets.epoll.as_fd()
@@ -181,7 +181,7 @@ impl Gateway {
             return;
         };
         if !headers.is_whole {
-            // A fragment of a packet that never becomes whole is lost without a count, as on a line.
+            // A fragment of a never completed packet is lost without a count, as on a line.
             if let Some(whole) = self.fragments.take(self.now, packet) {
                 self.handle_packet(now, &whole);
             }
@@ -201,7 +201,7 @@ impl Gateway {
         self.dropped += u64::from(!is_handled);
     }
 
-    /// Returns the next instant at which [`Gateway::handle_timeout`] must be called.
+    /// Returns the instant of the next necessary call of [`Gateway::handle_timeout`].
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         [self.tcp.poll_timeout(), self.udp.poll_timeout()].into_iter().flatten().min()
@@ -226,7 +226,7 @@ impl Gateway {
         self.tcp.is_delivered()
     }
 
-    /// Returns the number of packets from inside that the gateway has not passed on: damaged packets, and other protocols.
+    /// Returns the number of dropped packets from inside: damaged packets, and packets of further protocols.
     #[must_use]
     pub const fn dropped(&self) -> u64 {
         self.dropped

@@ -10,10 +10,10 @@ use rustix::net::sockopt::set_socket_linger;
 /// Bytes moved by one call at most.
 pub(super) const PIECE: usize = 1 << 16;
 
-/// Two ends that pass data to each other: a connection with the program inside, and a socket of the real machine.
+/// Two ends with data passed between both: a connection with the program inside, and a socket of the real machine.
 ///
 /// Each direction ends by itself, as TCP allows: an end of data on one side becomes an end of data on the other side, after all data. A reset on one side
-/// becomes a reset on the other side, and data that waits is lost with both, as on one connection.
+/// becomes a reset on the other side, and waiting data is lost with both, as on one connection.
 #[derive(Debug)]
 pub(super) struct Relay {
     pub(super) connection: Connection,
@@ -29,11 +29,11 @@ pub(super) struct Relay {
     inward: Waiting,
 }
 
-/// Data of one direction that one side has given and the other side has not taken yet.
+/// Data of one direction, given by one side and not yet taken by the other side.
 #[derive(Debug, Default)]
 struct Waiting {
     data: Vec<u8>,
-    /// Bytes of `data` that the other side has taken.
+    /// Bytes of `data` taken by the other side so far.
     taken: usize,
     /// The giving side has ended its data.
     is_ended: bool,

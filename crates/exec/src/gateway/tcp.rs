@@ -18,11 +18,11 @@ use super::{Ends, HOST, Owner, Sockets, address, unreachable};
 /// Time to live of resets, as in Linux.
 const TTL: u8 = 64;
 
-/// Connections by their ends, and listeners that lead inside.
+/// Connections by their ends, and listeners with a way inside.
 #[derive(Debug, Default)]
 pub(super) struct TcpTable {
     flows: BTreeMap<Ends, Flow>,
-    /// Deadlines of the connections that have a deadline.
+    /// Deadlines of connections; a connection may have no deadline.
     deadlines: BTreeSet<(Instant, Ends)>,
     listeners: Vec<(TcpListener, u16)>,
 }
@@ -54,7 +54,7 @@ impl TcpTable {
         Ok(())
     }
 
-    /// Handles a packet of TCP from inside. Returns `false` for a packet that is damaged or a fragment.
+    /// Handles a packet of TCP from inside. Returns `false` for a damaged packet and for a fragment.
     pub(super) fn handle_packet(&mut self, sockets: &mut Sockets, now: Instant, packet: &[u8]) -> bool {
         let Ok(segment) = Segment::parse(packet) else { return false };
         let ends = Ends { inside: segment.source, outside: segment.destination };
@@ -146,7 +146,7 @@ impl TcpTable {
                 let connection = Connection::connect(now, config(), ends.outside, ends.inside, initial(now)).map_err(io::Error::other)?;
                 Ok((sockets.watch(&socket, Owner::Tcp(ends))?, connection))
             });
-            // A client for which the system has no room is closed again.
+            // The system may have no room for a client, and the client is closed again.
             let Ok((token, connection)) = opened else { continue };
             self.flows.insert(ends, Flow { token, deadline: None, stage: Stage::Open(Box::new(Relay::new(connection, socket))) });
             self.settle(sockets, now, ends);
@@ -166,7 +166,7 @@ impl TcpTable {
         }
     }
 
-    /// Passes data of a connection, sends its segments, and notes its next deadline, or forgets a connection that has ended.
+    /// Passes data of a connection, sends segments, and notes the next deadline, or forgets an ended connection.
     fn settle(&mut self, sockets: &mut Sockets, now: Instant, ends: Ends) {
         let Some(flow) = self.flows.get_mut(&ends) else { return };
         let Stage::Open(relay) = &mut flow.stage else { return };
@@ -208,7 +208,7 @@ fn config() -> TcpConfig {
     TcpConfig { nodelay: true, ..TcpConfig::default() }
 }
 
-/// Returns the first sequence number of a connection, which grows by 1 every 4 µs (RFC 9293, section 3.4.1). The numbers may be easy to guess, because only the
+/// Returns the first sequence number of a connection: a counter of steps of 4 µs (RFC 9293, section 3.4.1). The numbers may be easy to guess, because only the
 /// host itself can send to its device.
 fn initial(now: Instant) -> u32 {
     u32::try_from((now.as_nanos() / 4000) % (1 << 32)).unwrap_or(0)

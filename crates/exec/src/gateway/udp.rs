@@ -15,13 +15,13 @@ use super::{Ends, HOST, Owner, Sockets, address, unreachable};
 /// Silence after which a flow is forgotten: the least that RFC 4787 recommends.
 const IDLE: Duration = Duration::from_secs(300);
 
-/// Flows at most. A new flow then takes the place of the flow that was silent for longest.
+/// Flows at most. A new flow then takes the place of the flow with the longest silence.
 const MOST: usize = 4096;
 
 /// Longest packet to the program inside \[bytes\]: the MTU of its device.
 const MTU: usize = 1500;
 
-/// Flows by their ends, and ports that lead inside.
+/// Flows by their ends, and ports with a way inside.
 #[derive(Debug, Default)]
 pub(super) struct UdpTable {
     flows: BTreeMap<Ends, Flow>,
@@ -42,7 +42,7 @@ struct Flow {
 /// Way of the datagrams of a flow from inside.
 #[derive(Debug)]
 enum Way {
-    /// Connected socket of a flow that the program inside has begun.
+    /// Connected socket of a flow from inside.
     Own { socket: UdpSocket, token: u64 },
     /// Client of the port at the index `port`.
     Client { port: usize, client: SocketAddr },
@@ -57,7 +57,7 @@ impl UdpTable {
         Ok(())
     }
 
-    /// Handles a packet of UDP from inside. Returns `false` for a packet that is damaged.
+    /// Handles a packet of UDP from inside. Returns `false` for a damaged packet.
     pub(super) fn handle_packet(&mut self, sockets: &mut Sockets, now: Instant, packet: &Packet) -> bool {
         let (Content::Ip { headers, .. }, Some(data)) = (packet.content(), packet.datagram_data()) else { return false };
         let Some([from, to]) = headers.ports else { return false };
@@ -79,7 +79,7 @@ impl UdpTable {
                 }
             }
             Way::Client { port, client } => {
-                // A datagram that the system refuses is lost, as on a line.
+                // A refused datagram is lost, as on a line.
                 let _ = self.ports[*port].0.send_to(data, client);
             }
         }
@@ -139,7 +139,7 @@ impl UdpTable {
             let (length, client) = match received {
                 Ok(received) => received,
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => return,
-                // The call reports the error of an earlier answer, to a client that is gone.
+                // The call reports the error of an earlier answer, to a departed client.
                 Err(_) => continue,
             };
             let known = self.clients.get(&(place, client)).copied().filter(|ends| self.flows.contains_key(ends));
@@ -182,14 +182,14 @@ impl UdpTable {
 /// Sends the first `length` bytes of the buffer inside, as a datagram, in fragments if the datagram is longer than a packet may be.
 fn deliver(sockets: &mut Sockets, ends: Ends, length: usize) {
     let packet = Packet::datagram(ends.outside, ends.inside, &sockets.buffer[..length]);
-    // Fragments of two datagrams must differ while both are on the way; a number that counts up repeats after 65,536 datagrams at the earliest.
+    // Fragments of two datagrams must differ while both are on the way; a counter repeats after 65,536 datagrams at the earliest.
     sockets.identification = sockets.identification.wrapping_add(1);
     sockets.out.extend(packet.into_iter().flat_map(|packet| packet.cut(MTU, sockets.identification)));
 }
 
 /// Tells the program inside why its datagrams do not arrive, as the network would.
 fn tell(sockets: &mut Sockets, ends: Ends, error: &io::Error) {
-    // Any other error, such as a full buffer, only loses the datagram.
+    // Other errors, such as a full buffer, only lose the datagram.
     let Some(why) = unreachable(error) else { return };
     sockets.out.extend(Packet::unreachable(address::gateway(ends.inside.ip()), Protocol::UDP, [ends.inside, ends.outside], 0, why));
 }

@@ -17,12 +17,12 @@ use crate::channel::{Channel, Report};
 /// Numbers of the offloads of a device in [`Report::Device`].
 const OFFLOADS: [Option<Join>; 3] = [None, Some(Join::Tcp), Some(Join::TcpAndUdp)];
 
-/// Returns the offloads of a device by their number.
+/// Returns the offloads of a device by the number in a report.
 pub(crate) fn offloads(number: u8) -> Option<Join> {
     OFFLOADS.get(usize::from(number)).copied().flatten()
 }
 
-/// Makes the host, and waits for its end. Reports failures through the channel.
+/// Makes the host, and waits for the end of the host. Reports failures through the channel.
 pub(super) fn enter(setup: &OsStr, command: &[OsString]) -> io::Result<()> {
     let channel = Channel::of_standard_input()?;
     let setup = setup.to_str().and_then(Setup::of_text).ok_or(io::ErrorKind::InvalidInput)?;

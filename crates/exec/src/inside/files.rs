@@ -1,4 +1,4 @@
-//! Files that a host inside sees in place of the machine's: names of hosts, the name server, and settings of the network.
+//! Files of a host inside, in place of the machine's: names of hosts, the name server, and settings of the network.
 
 use std::fs::{self, OpenOptions};
 use std::io::{self, Write as _};
@@ -21,7 +21,7 @@ pub(super) fn mount_processes() {
     let _ = mount(Some("proc"), "/proc", Some("proc"), flags, NONE);
 }
 
-/// Lets the command send echo requests and listen at low ports, because nobody else uses the network. Where /proc/sys cannot be written, as in some containers, the
+/// Lets the command send echo requests and listen at low ports. Nobody else uses the network. Where /proc/sys cannot be written, as in some containers, the
 /// command has the rights of its user.
 pub(super) fn allow_ordinary_users() {
     let group = nix::unistd::getegid();
@@ -29,7 +29,7 @@ pub(super) fn allow_ordinary_users() {
     let _ = fs::write("/proc/sys/net/ipv4/ip_unprivileged_port_start", "0");
 }
 
-/// Replaces /etc/hosts, /etc/resolv.conf and the line of hosts in /etc/nsswitch.conf. An error comes with the step that failed.
+/// Replaces /etc/hosts, /etc/resolv.conf and the line of hosts in /etc/nsswitch.conf. An error comes with the failed step.
 pub(super) fn name_hosts(setup: &Setup) -> Result<(), (String, io::Error)> {
     // Names stand for addresses of IPv4 alone. Many servers listen only there, and clients that try IPv6 first would be refused once.
     let v4 = || setup.addresses.iter().map(|network| network.address()).filter(|address| address.is_ipv4());
@@ -48,7 +48,7 @@ fn plain_names(text: &str) -> String {
     text.lines().map(|line| if line.trim_start().starts_with("hosts:") { "hosts: files dns\n".to_owned() } else { format!("{line}\n") }).collect()
 }
 
-/// Puts another text in the place of a file of the machine, for this namespace alone. A file that does not exist is not made.
+/// Puts another text in the place of a file of the machine, for this namespace alone. A missing file is not made.
 fn replace(path: &str, change: impl FnOnce(&str) -> String) -> Result<(), (String, io::Error)> {
     let step = |what: &str| format!("{what} {path}");
     if !Path::new(path).exists() {
@@ -63,7 +63,7 @@ fn replace(path: &str, change: impl FnOnce(&str) -> String) -> Result<(), (Strin
     mounted.map_err(|error| (step("replace"), error.into()))
 }
 
-/// Writes a file that everybody may read, under a name that nobody else has.
+/// Writes a file for all readers, under an unused name.
 fn write_temporary(text: &str) -> io::Result<PathBuf> {
     let folder = std::env::temp_dir();
     for number in 0..u32::MAX {

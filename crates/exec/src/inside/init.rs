@@ -15,7 +15,7 @@ use super::{CANNOT_RUN, NOT_FOUND, OWN_FAILURE, enter, files};
 use crate::channel::{Channel, Order, Report};
 use crate::signals;
 
-/// Starts the command when the program outside says so, and reports its end.
+/// Starts the command at the order of the program outside, and reports the end of the command.
 pub(super) fn init(command: &[OsString]) -> io::Result<()> {
     let channel = Channel::of_standard_input()?;
     enter::dies_with_parent()?;
@@ -111,7 +111,7 @@ fn watch(channel: &Channel, signals: &SignalFd, child: Pid) -> io::Result<u8> {
     }
 }
 
-/// Takes the statuses of all children that have ended: the command, and orphans that became children of process 1. Returns the status of the command.
+/// Takes the statuses of all ended children: the command, and orphans adopted by process 1. Returns the status of the command.
 fn reap(child: Pid) -> io::Result<Option<u8>> {
     let mut found = None;
     loop {

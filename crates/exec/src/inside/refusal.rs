@@ -1,10 +1,10 @@
-//! Refusals of the system in words, with the setting that is in the way.
+//! Refusals of the system in words, with the responsible setting.
 
 use std::fs;
 use std::io;
 use std::path::Path;
 
-/// Setting that can forbid namespaces to ordinary users.
+/// Setting of the system about namespaces of ordinary users.
 struct Setting {
     /// File below `/proc/sys`.
     file: &'static str,
@@ -22,7 +22,7 @@ const SETTINGS: [Setting; 3] = [
     Setting { file: "user/max_user_namespaces", zero_forbids: true, allows: "10000", known_from: "hardened systems" },
 ];
 
-/// Returns the words for a step that the system has refused, with the way out.
+/// Returns the words for a refused step, with the way out.
 pub(super) fn words(what: &str, error: &io::Error) -> String {
     let refused = format!("cannot {what}: {error}");
     if what.contains("/dev/net/tun") {
@@ -38,7 +38,7 @@ pub(super) fn words(what: &str, error: &io::Error) -> String {
     if is_refusal { format!("{refused}\n{}", way_out(Path::new("/proc/sys"))) } else { refused }
 }
 
-/// Returns the settings under `folder` that forbid namespaces, each with the command that allows them, and what works without.
+/// Returns the settings under `folder` that forbid namespaces, each with the command to allow namespaces, and an alternative without namespaces.
 fn way_out(folder: &Path) -> String {
     let forbids = |setting: &Setting| {
         let value: u64 = fs::read_to_string(folder.join(setting.file)).ok()?.trim().parse().ok()?;

@@ -21,7 +21,7 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Returns the text that [`Setup::of_text`] reads.
+    /// Returns the text for [`Setup::of_text`].
     pub(crate) fn to_text(&self) -> String {
         let name = self.name.iter().map(|name| format!("name {name}"));
         let addresses = self.addresses.iter().map(|address| format!("address {address}"));

@@ -1,4 +1,4 @@
-//! A whole run: hosts with their commands, the links between them, and the gateway.
+//! A whole run: hosts with their commands, links, and the gateway.
 
 mod output;
 mod watch;
@@ -53,7 +53,7 @@ pub struct Plan {
 pub struct HostPlan {
     /// Name of the host, by which links, captures and output name the host.
     pub name: String,
-    /// Network and names that the command sees.
+    /// Network and names in the view of the command.
     pub setup: Setup,
     /// Command with its arguments.
     pub command: Vec<OsString>,
@@ -72,16 +72,16 @@ pub struct GatewayPlan {
     pub name: String,
     /// Name server of the machine.
     pub name_server: Option<SocketAddr>,
-    /// Addresses of the machine that lead to the same port of the first host.
+    /// Addresses of the machine with a way to the same port of the first host.
     pub listen: Vec<SocketAddr>,
 }
 
 /// Result of a run.
 #[derive(Debug)]
 pub struct Outcome {
-    /// Exit status: that of the main command, or else of the first command that ended with another status than 0, or else 0.
+    /// Exit status: that of the main command, or else of the first failed command, or else 0.
     pub status: u8,
-    /// Exit status of each command, or `None` for a command that did not end by itself in time.
+    /// Exit status of each command, or `None` for a command ended by force.
     pub statuses: Vec<Option<u8>>,
     /// Counters of the links.
     pub report: Report,
@@ -96,9 +96,9 @@ pub struct Report {
     pub links: Vec<(usize, usize, LinkStats)>,
     /// Names of the hosts, and of the gateway.
     pub nodes: Vec<String>,
-    /// Packets that no link has taken.
+    /// Packets not taken by any link.
     pub untaken: Counts,
-    /// Packets that the device of each node, or the gateway, did not take, indexed by node.
+    /// Packets refused by the device of each node, or by the gateway, indexed by node.
     pub refused: Vec<u64>,
     /// Lateness of the packets.
     pub release: LatenessSummary,
@@ -110,7 +110,7 @@ pub struct Report {
     pub capture_error: Option<String>,
 }
 
-/// Runs a plan. `hear` gets each line that a piped command writes.
+/// Runs a plan. `hear` gets each line of a piped command.
 ///
 /// # Errors
 ///
@@ -150,7 +150,7 @@ pub fn run(plan: &Plan, hear: &(dyn Fn(Line<'_>) + Sync)) -> Result<Outcome, Fai
         let driver = driver.map_err(|error| Failed::own(format!("the system gives the network no thread: {error}")))?;
         let readers = outputs.read(scope, hear);
         let ended = readers.and_then(|()| Watch::new(plan, &hosts, &signals, &outputs).until_all_have_ended(&stop));
-        // A failure leaves nothing that has to arrive.
+        // After a failure no data has to arrive.
         if ended.is_err() {
             stop.now();
         }

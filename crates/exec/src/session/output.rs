@@ -1,4 +1,4 @@
-//! Output of piped commands, line by line, and the wake-ups of the thread that watches the commands.
+//! Output of piped commands, line by line, and the wake-ups of the watching thread.
 
 use std::io::{self, BufRead as _, BufReader, PipeReader, PipeWriter, Read, Write as _};
 use std::os::fd::{AsFd as _, BorrowedFd};
@@ -15,7 +15,7 @@ use crate::host::{Failed, Host};
 pub struct Line<'a> {
     /// Index of the host in [`Plan::hosts`].
     pub host: usize,
-    /// Stream to which the command has written.
+    /// Stream of the line.
     pub stream: Stream,
     /// Bytes of the line, without the line break.
     pub bytes: &'a [u8],
@@ -35,11 +35,11 @@ type Pipe = (usize, Stream, Box<dyn Read + Send>);
 
 /// Outputs of all hosts.
 pub(super) struct Outputs {
-    /// Pipes that are still to be read, with host and stream.
+    /// Pipes still to be read, with host and stream.
     pipes: Mutex<Vec<Pipe>>,
-    /// Texts for which the output is searched, indexed by host.
+    /// Texts to be searched for in the output, indexed by host.
     wanted: Vec<Option<Vec<u8>>>,
-    /// Hosts whose text has come.
+    /// `true` after the text of the host has come, indexed by host.
     ready: Vec<AtomicBool>,
     has_network_ended: AtomicBool,
     /// Pipe that becomes readable with each wake-up.
@@ -86,7 +86,7 @@ impl Outputs {
         }
     }
 
-    /// Wakes the thread that watches the commands.
+    /// Wakes the watching thread.
     fn wake(&self) {
         let _ = (&self.wakes).write_all(b"w");
     }

@@ -22,13 +22,13 @@ const TO_END: Duration = Duration::from_secs(5);
 /// State of a command.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum State {
-    /// The command waits for the hosts before it to be ready.
+    /// The command waits until all hosts before are ready.
     Waits,
     Runs,
     Ended(u8),
 }
 
-/// Watches over the commands: starts them in turn, passes signals on, and ends them together.
+/// Watch over the commands: starts in turn, signals, and the end of all commands together.
 pub(super) struct Watch<'a> {
     plan: &'a Plan,
     /// Hosts; `None` after the host was ended by force.
@@ -37,7 +37,7 @@ pub(super) struct Watch<'a> {
     signals: &'a SignalFd,
     outputs: &'a Outputs,
     clock: MonotonicClock,
-    /// Status of the run, once it is known.
+    /// Status of the run; `None` before the run is ending.
     status: Option<u8>,
     /// Instant at which the remaining commands are killed; `None` before the run is ending.
     kill_at: Option<Instant>,
@@ -70,7 +70,7 @@ impl<'a> Watch<'a> {
         Ok((self.status.unwrap_or(0), self.states.iter().map(ended).collect()))
     }
 
-    /// Starts the commands of all hosts before which every host is ready.
+    /// Starts each command for which all hosts before are ready.
     fn start_ready(&mut self) -> Result<(), Failed> {
         for place in 0..self.states.len() {
             if self.states[place] == State::Waits && self.kill_at.is_none() {
@@ -79,7 +79,7 @@ impl<'a> Watch<'a> {
                 started.map_err(|error| Failed::own(format!("cannot start the command: {error}")))?;
                 self.states[place] = State::Runs;
             }
-            // A command that has ended keeps nobody waiting: the run goes on, or ends with its status.
+            // Nobody waits for an ended command: the run goes on, or ends with the status of the command.
             let is_waited_for = self.plan.hosts[place].ready.is_some() && !self.outputs.is_ready(place) && self.states[place] == State::Runs;
             if is_waited_for {
                 break;
@@ -88,7 +88,7 @@ impl<'a> Watch<'a> {
         Ok(())
     }
 
-    /// Waits for a signal, a report, a host that has become ready, or the time to kill.
+    /// Waits for a signal, a report, a newly ready host, or the time to kill.
     fn wait(&self) -> io::Result<()> {
         let mut readable: Vec<BorrowedFd<'_>> = self.hosts.iter().flatten().map(|host| host.channel.as_fd()).collect();
         readable.extend([self.signals.as_fd(), self.outputs.as_fd()]);
@@ -110,11 +110,11 @@ impl<'a> Watch<'a> {
         Ok(())
     }
 
-    /// Passes a signal to all commands that run.
+    /// Passes a signal to all running commands.
     fn tell_all(&self, signal: Signal) {
         let number = u8::try_from(signal as i32).unwrap_or(0);
         for host in self.hosts.iter().flatten() {
-            // A host that has just ended needs no signal.
+            // A just ended host needs no signal.
             let _ = host.channel.order(Order::Signal(number), None);
         }
     }
@@ -139,7 +139,7 @@ impl<'a> Watch<'a> {
         Ok(())
     }
 
-    /// Notes the end of a command. The end of the main command, or without one the first failure, ends the run: the other commands get SIGTERM.
+    /// Notes the end of a command. The end of the main command, or without a main command the first failure, ends the run: all other commands get SIGTERM.
     fn end(&mut self, place: usize, status: u8) {
         self.states[place] = State::Ended(status);
         self.hosts[place] = None;
