@@ -13,11 +13,11 @@ pub struct StreamsConfig {
     pub seed: u64,
     /// Proxies. Proxy n has the lines 2n, from its clients to its program, and 2n + 1, back.
     pub proxies: Vec<Proxy>,
-    /// Bytes that the relay holds at most, of all connections. A connection beyond the bound waits.
+    /// Largest number of held bytes of all connections. A connection beyond the bound waits.
     pub most_bytes: Bytes,
 }
 
-/// Listening address, and the program that clients reach there.
+/// Listening address, and the program for the clients of this address.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Proxy {
     /// Name of the proxy. Seed and name select the random streams.

@@ -10,7 +10,7 @@ use super::direction::Direction;
 pub struct ConnectionId {
     /// Place in the table. Used again after the connection is over, so that a table of the driver can have the same places.
     slot: u32,
-    /// Number of connections that had the place before.
+    /// Number of former connections at the place.
     generation: u32,
 }
 
@@ -26,7 +26,7 @@ impl ConnectionId {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum State {
     Open,
-    /// A fault has ended both streams. Bytes that still come are lost.
+    /// A fault has ended both streams. All later bytes are lost.
     Closing,
 }
 

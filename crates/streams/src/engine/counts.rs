@@ -5,11 +5,11 @@
 pub struct Counts {
     /// Connections of clients.
     pub opened: u64,
-    /// Connections that the program refused or that could not be made. The client was reset.
+    /// Connections refused by the program or by the system. The client was reset.
     pub refused: u64,
-    /// Connections at whose end both streams had ended.
+    /// Connections with an end after the end of both streams.
     pub ended: u64,
-    /// Connections that an end reset.
+    /// Connections reset by an end.
     pub reset: u64,
     /// Connections closed by `close-after`.
     pub closed_after: u64,
@@ -19,13 +19,13 @@ pub struct Counts {
     pub cut_after: u64,
 }
 
-/// Counters of one line.
+/// Counters of a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct LineCounts {
-    /// Bytes that came from the senders.
+    /// Bytes received from the senders.
     pub received: u64,
     /// Bytes written to the receivers.
     pub sent: u64,
-    /// Bytes that reached no receiver: cut, or held by a connection that was closed or reset.
+    /// Bytes without a receiver: cut, or held by a closed or reset connection.
     pub lost: u64,
 }

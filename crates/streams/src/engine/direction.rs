@@ -1,4 +1,4 @@
-//! One direction of a connection: the held bytes, and the faults that hold or cut bytes.
+//! One direction of a connection: the held bytes, and the faults of holding and cutting bytes.
 
 use std::collections::VecDeque;
 
@@ -13,7 +13,7 @@ use super::End;
 pub(super) struct Direction {
     /// Held bytes: first `ready` bytes for the receiver, then `stalled` bytes, then bytes on the line.
     bytes: VecDeque<u8>,
-    /// Bytes that the receiver may have now.
+    /// Bytes for the receiver now.
     ready: usize,
     /// Bytes that left the line during a stall.
     stalled: usize,
@@ -32,7 +32,7 @@ pub(super) struct Direction {
     due: Option<Instant>,
 }
 
-/// Slicer of one direction.
+/// Slicer of a direction.
 #[derive(Debug)]
 struct Slices {
     law: Slice,
@@ -57,7 +57,7 @@ pub(super) enum Wrote {
 }
 
 impl Direction {
-    /// `cut` is the number of bytes before the cut. `slices` is the law of pieces with the stream of their sizes.
+    /// `cut` is the number of bytes before the cut. `slices` is the law of pieces with the random stream of the sizes.
     pub(super) fn new(window: u64, cut: Option<u64>, slices: Option<(Slice, Stream)>) -> Self {
         let slices = slices.map(|(law, draws)| Slices { law, draws, drawn: 0, present: 0, not_before: Instant::ZERO });
         Self {
@@ -84,12 +84,12 @@ impl Direction {
         self.bytes.len()
     }
 
-    /// Returns the number of bytes that may still come. After the end the sender may be read without bound, because only its reset can come.
+    /// Returns the number of bytes that may still come. After the end the sender may be read without bound, because only a reset can come.
     pub(super) fn room(&self) -> usize {
         if self.has_ended { usize::MAX } else { self.window.saturating_sub(self.bytes.len()) }
     }
 
-    /// Takes bytes of the sender, which go on the line.
+    /// Takes bytes of the sender for the line.
     pub(super) fn push(&mut self, bytes: &[u8]) {
         self.bytes.extend(bytes);
     }
@@ -111,13 +111,13 @@ impl Direction {
         // Bytes beyond the cut stay held until the close, where held bytes are counted as lost.
         self.ready += before;
         if self.ready > 0 && self.due.is_none() {
-            // Bytes that come during the gap between two pieces are due at its end.
+            // Bytes that come during the gap between two pieces are due at the end of the gap.
             let gap = self.slices.as_ref().filter(|slices| slices.present == 0).map_or(at, |slices| slices.not_before);
             self.due = Some(at.max(gap));
         }
     }
 
-    /// Ends a stall at the instant `at`: the bytes that waited can reach the receiver.
+    /// Ends a stall at the instant `at`: the waiting bytes can reach the receiver.
     pub(super) fn resume(&mut self, at: Instant) {
         self.is_stalled = false;
         let count = std::mem::take(&mut self.stalled);
@@ -134,7 +134,7 @@ impl Direction {
         self.left == Some(0) && self.ready == 0
     }
 
-    /// Returns the bytes that may be written now, in one write each, or `None` if none may.
+    /// Returns the bytes for one write now, or `None` if nothing may be written.
     pub(super) fn writable(&mut self, now: Instant) -> Option<&[u8]> {
         if self.ready == 0 {
             return None;

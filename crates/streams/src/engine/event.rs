@@ -5,9 +5,9 @@ use super::connection::ConnectionId;
 /// End of a connection.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Side {
-    /// The program that connected to the relay.
+    /// Program beyond the listener of the relay.
     Client,
-    /// The program to which the relay connected.
+    /// Program at the address of the proxy.
     Server,
 }
 
@@ -43,7 +43,7 @@ pub enum Event {
     Close(ConnectionId, Close),
 }
 
-/// Way in which both sockets of a connection are closed.
+/// Kind of the close of both sockets of a connection.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Close {
     /// After the end of both streams.

@@ -9,7 +9,7 @@ use super::direction::Direction;
 use super::{Side, Timer};
 use crate::config::Proxy;
 
-/// Directions of a new connection, and its deadlines, as ages of the connection.
+/// Directions and deadlines of a new connection. Deadlines are ages of the connection.
 pub(super) struct Chosen {
     /// Direction of the bytes of each side, with the time by which its end is late.
     pub(super) directions: [(Direction, Duration); 2],

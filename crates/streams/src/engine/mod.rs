@@ -1,4 +1,4 @@
-//! The relay of TCP without sockets and without a clock: bytes with instants come in, and bytes that may be written come out.
+//! The relay of TCP without sockets and without a clock: bytes with instants come in, and writable bytes come out.
 
 mod connection;
 mod counts;
@@ -25,11 +25,11 @@ pub use event::{Close, Event, Side};
 /// Bytes of a piece on the line, at most: the payload of a segment of TCP over Ethernet with the usual options. Jitter is drawn and the rate is kept per piece.
 pub const PIECE: usize = 1448;
 
-/// Time that a closed connection waits for its ends: bytes that arrive meanwhile are read and lost, because a system resets a connection with unread bytes at
+/// Time of a closed connection until its end: bytes arriving meanwhile are read and lost, because a system resets a connection with unread bytes at
 /// its close.
 const LINGER: Duration = Duration::from_secs(1);
 
-/// Way in which a sender ends its stream.
+/// End of a stream by its sender.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum End {
     /// The sender sends no more (FIN).
@@ -43,7 +43,7 @@ enum End {
 #[error("there is no such line")]
 pub struct NoLine;
 
-/// Piece on a line: the end of a stream, or a number of the next bytes of its connection.
+/// Piece on a line: the end of a stream, or a number of the next bytes of the connection.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Piece {
     connection: ConnectionId,
@@ -75,11 +75,11 @@ pub struct Engine {
     /// Time up to which [`Engine::poll_event`] goes.
     now: Instant,
     timers: BTreeSet<(Instant, ConnectionId, Timer)>,
-    /// Pieces that have left their lines, with the line, in the order of arrival.
+    /// Pieces at the end of their lines, with the line, in the order of arrival.
     arrivals: BTreeMap<(Instant, u64), (usize, Piece)>,
-    /// Number of pieces that have left their lines. Orders pieces of the same instant.
+    /// Number of arrived pieces. Orders pieces of the same instant.
     arrived: u64,
-    /// Ends for which bytes have become writable, and whose event is not polled yet.
+    /// Ends with newly writable bytes, until the event is polled.
     ready: BTreeSet<(ConnectionId, Side)>,
     /// Events to be polled after the events for `ready`.
     events: VecDeque<Event>,
@@ -178,7 +178,7 @@ impl Engine {
         found.directions[from.index()].room().min(free)
     }
 
-    /// Takes bytes that an end has sent, at most [`room`](Self::room).
+    /// Takes bytes from an end, at most [`room`](Self::room).
     pub fn handle_bytes(&mut self, now: Instant, connection: ConnectionId, from: Side, bytes: &[u8]) {
         let Some(found) = self.connections.get_mut(connection) else { return };
         let line = &mut self.lines[found.line(from)];
@@ -230,7 +230,7 @@ impl Engine {
         self.close(connection, Close::Reset);
     }
 
-    /// Returns the bytes that may be written to this end in the next write, or `None` if none may be written now.
+    /// Returns the bytes that may be written to this end in the next write, or `None` if nothing may be written now.
     pub fn writable(&mut self, connection: ConnectionId, to: Side) -> Option<&[u8]> {
         let now = self.now;
         let found = self.connections.get_mut(connection).filter(|found| found.state == State::Open)?;
@@ -265,7 +265,7 @@ impl Engine {
     /// Returns the instant of the next necessary call of [`Engine::handle_timeout`], or `None` if nothing is under way.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        // Events of inputs and pieces that left a line at an offer wait for their poll.
+        // Events of inputs, and pieces out of a line at an offer, wait to be polled.
         if !self.events.is_empty() || !self.ready.is_empty() || !self.arrivals.is_empty() {
             return Some(self.now);
         }
@@ -273,7 +273,7 @@ impl Engine {
         lines.chain(self.timers.first().map(|(at, ..)| *at)).min()
     }
 
-    /// Lets time pass until `now`. What happens by then comes from [`Engine::poll_event`].
+    /// Lets time pass until `now`. [`Engine::poll_event`] then returns the events until `now`.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.now = self.now.max(now);
     }
@@ -281,7 +281,7 @@ impl Engine {
     /// Returns the next request, in the order of happening: bytes that arrive before the end of their connection can be written before the event of the end.
     pub fn poll_event(&mut self) -> Option<Event> {
         loop {
-            // Bytes come before the events that follow them. Bytes of several pieces make one event, because each event is a call of the system.
+            // Bytes come before later events. Bytes of several pieces make one event, because each event is a call of the system.
             let next = if self.events.is_empty() { self.next() } else { Next::Flush };
             let is_end = match next {
                 Next::Arrival(_, Piece { what: What::Bytes(_), .. }) | Next::Line(..) => false,
@@ -312,7 +312,7 @@ impl Engine {
         }
     }
 
-    /// Returns the next thing that is due by now. At equal instants a deadline of a connection comes before bytes arrive, so
+    /// Returns the next due step. At equal instants a deadline of a connection comes before bytes arrive, so
     /// that a fault at the age zero holds for the first byte too.
     fn next(&self) -> Next {
         let due = |at: Instant| (at <= self.now).then_some(at);
@@ -324,7 +324,7 @@ impl Engine {
         first.map_or(Next::Flush, |(_, _, next)| next)
     }
 
-    /// Takes the pieces that have left a line. A line reports each piece once, also after an offer or a change at a later instant.
+    /// Takes the pieces at the end of a line. A line reports each piece once, also after an offer or a change at a later instant.
     fn collect(&mut self, place: usize) {
         let line = &mut self.lines[place];
         while let Some(event) = line.link.poll_event() {
@@ -338,9 +338,9 @@ impl Engine {
         }
     }
 
-    /// Takes a piece that has left its line.
+    /// Takes a piece at the end of its line.
     fn arrive(&mut self, at: Instant, place: usize, Piece { connection, what }: Piece) {
-        // Pieces of a connection that is over are dropped. The end of the connection has counted their bytes as lost.
+        // Pieces of an ended connection are dropped. The end of the connection has counted their bytes as lost.
         let Some(found) = self.connections.get_mut(connection).filter(|found| found.state == State::Open) else { return };
         let from = if place.is_multiple_of(2) { Side::Client } else { Side::Server };
         let direction = &mut found.directions[from.index()];
@@ -381,7 +381,7 @@ impl Engine {
             self.finish_both(connection);
             return;
         }
-        // A reset overtakes the bytes that wait for their receiver, as in TCP.
+        // A reset overtakes the bytes in wait for the receiver, as in TCP.
         if direction.end == Some(End::Reset) && !direction.is_stalled {
             self.counts[proxy].reset += 1;
             self.close(connection, Close::Reset);
@@ -488,7 +488,7 @@ impl Engine {
         self.counts.get(proxy)
     }
 
-    /// Returns the counters of a line in bytes, and those of its pieces, ends of streams among them.
+    /// Returns the counters of a line in bytes and in pieces. The end of a stream counts as a piece.
     #[must_use]
     pub fn line(&self, line: usize) -> Option<(LineCounts, LinkStats)> {
         self.lines.get(line).map(|line| (line.counts, line.link.stats()))
@@ -500,7 +500,7 @@ impl Engine {
         self.lines.get(line).map_or(&[], |line| line.recent.delays())
     }
 
-    /// Returns the number of connections that are open now, of all proxies.
+    /// Returns the number of open connections of all proxies.
     #[must_use]
     pub fn open_connections(&self) -> usize {
         self.connections.len()

@@ -41,7 +41,7 @@ pub enum StreamsError {
         /// Error of the system.
         source: io::Error,
     },
-    /// A proxy would connect to a listening address of the relay, and every connection would make another one without end.
+    /// A proxy would connect to a listening address of the relay, and every connection would make a further connection, without end.
     #[error("{to} is an address of the relay itself: expected the address of a program")]
     ToItself {
         /// Address of the program.
@@ -125,7 +125,7 @@ impl Streams {
         loop {
             self.sockets.serve(&mut self.engine, clock())?;
             while let Ok(Control { line, stream }) = control.try_recv() {
-                // The only reason for a refusal is an index beyond the lines, which the maker of the message has from the configuration.
+                // The only reason for a refusal is an index beyond the lines, taken by the maker of the message from the configuration.
                 let _ = self.engine.set_stream(clock(), line, *stream);
             }
             self.engine.handle_timeout(clock());
@@ -136,7 +136,7 @@ impl Streams {
                     self.sockets.handle(&mut self.engine, event);
                 }
             }
-            // Writing has made room, for which ends may wait that were readable before.
+            // Writing has made room, and ends readable before may wait for room.
             self.sockets.read(&mut self.engine, clock());
             let now = clock();
             if end.is_some_and(|end| now >= end) {
@@ -163,7 +163,7 @@ impl Streams {
         if !is_precise {
             self.sockets.wait(span)?;
         } else if span > NEAR {
-            // Rounded down by more than the resolution, so that mio does not wait beyond the deadline.
+            // Rounded down by more than the resolution, so the wait of mio ends before the deadline.
             self.sockets.wait(span - NEAR / 2)?;
         } else if !self.sockets.wait(Duration::ZERO)? {
             std::thread::sleep(span.min(REST));

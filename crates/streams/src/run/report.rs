@@ -16,9 +16,9 @@ pub struct Report {
     pub elapsed: Duration,
     /// Proxies, in the order of the configuration.
     pub proxies: Vec<ProxyReport>,
-    /// Connections that were open at the end. They were closed.
+    /// Connections open at the end, and then closed.
     pub open: usize,
-    /// Bytes that the relay held at the end.
+    /// Bytes held by the relay at the end.
     pub held: Bytes,
     /// Lateness of the first write of each batch of bytes, from the instant at which the bytes had left their line. Writes that waited for their receiver are
     /// left out.
@@ -27,7 +27,7 @@ pub struct Report {
     pub validity: Validity,
 }
 
-/// Report of one proxy.
+/// Report of a proxy.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ProxyReport {
     /// Name of the proxy.
@@ -42,7 +42,7 @@ pub struct ProxyReport {
     pub lines: [LineReport; 2],
 }
 
-/// Counters of one line.
+/// Counters of a line.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LineReport {
     /// Counters of bytes.

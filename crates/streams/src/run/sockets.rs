@@ -21,7 +21,7 @@ const READ: usize = 64 * 1024;
 /// Wait after the system has refused a descriptor. Readiness of a listener is told once, so without a new attempt a client would wait for the next client.
 const AGAIN: Duration = Duration::from_millis(20);
 
-/// Largest number of sockets whose readiness one call returns.
+/// Largest number of ready sockets from one call.
 const EVENTS: usize = 1024;
 
 pub(super) struct Sockets {
@@ -34,9 +34,9 @@ pub(super) struct Sockets {
     targets: Vec<SocketAddr>,
     /// Sockets of each connection, indexed by [`ConnectionId::slot`].
     pairs: Vec<Option<Pair>>,
-    /// Ends that may have bytes to read. Readiness is told once, so that the ends stay here until a read would block.
+    /// Ends with possible bytes to read. Readiness is told once, so that the ends stay here until a read would block.
     readable: BTreeSet<(ConnectionId, Side)>,
-    /// Listeners that may have clients.
+    /// Listeners with possible clients.
     waiting: BTreeSet<usize>,
     /// `true` if the system refused a descriptor: clients are accepted again after [`AGAIN`].
     is_short: bool,
@@ -110,7 +110,7 @@ impl Sockets {
         self.is_short.then(|| now.saturating_add(AGAIN))
     }
 
-    /// Waits until a socket is ready, at most for `span`. Returns whether one is.
+    /// Waits until a socket is ready, at most for `span`. Returns whether a socket is ready.
     pub(super) fn wait(&mut self, span: Duration) -> io::Result<bool> {
         match self.poll.poll(&mut self.events, Some(span)) {
             Ok(()) => Ok(!self.events.is_empty()),
@@ -177,7 +177,7 @@ impl Sockets {
             reset(&client);
             return Ok(());
         };
-        // Small writes leave at their instant, not after the acknowledgement of earlier ones. A refusal makes writes late, and no more.
+        // Without Nagle's algorithm small writes leave at once, not after an acknowledgement. If the system refuses, writes are late.
         let _ = client.set_nodelay(true);
         let token = self.listeners.len() + 2 * id.slot();
         let both = Interest::READABLE | Interest::WRITABLE;
@@ -250,7 +250,7 @@ impl Sockets {
         let Some(pair) = self.pair(id) else { return };
         let place = usize::from(side == Side::Server);
         if pair.is_full[place] || (side == Side::Server && !pair.is_connected) {
-            // Bytes that wait for their receiver are not late by the fault of the relay.
+            // The relay is not to blame for bytes that wait for a slow receiver.
             engine.take_due(id, side);
             return;
         }
@@ -282,7 +282,7 @@ impl Sockets {
             Event::Finish(id, side) => self.finish(id, &[side]),
             Event::FinishBoth(id) => {
                 self.finish(id, &[Side::Client, Side::Server]);
-                // Bytes that wait in the system are read now, because their end may be the last event of the socket.
+                // Bytes waiting in the system are read now, because the socket may have no further event.
                 self.readable.extend([(id, Side::Client), (id, Side::Server)]);
                 let is_connected = self.pair(id).is_none_or(|pair| pair.is_connected);
                 if !is_connected {
@@ -304,13 +304,13 @@ impl Sockets {
     fn finish(&mut self, id: ConnectionId, sides: &[Side]) {
         let Some(pair) = self.pair(id) else { return };
         for side in sides {
-            // The call fails if the other program is gone, which needs no answer.
+            // The call fails if the other program is gone, and a failure needs no answer.
             let _ = pair.socket(*side).shutdown(Shutdown::Write);
         }
     }
 }
 
-/// Makes the close of a socket a reset. A system that refuses closes the socket in the ordinary way.
+/// Makes the close of a socket a reset. If the system refuses, the close is an ordinary close.
 fn reset(socket: &TcpStream) {
     let _ = SockRef::from(socket).set_linger(Some(Duration::ZERO));
 }
