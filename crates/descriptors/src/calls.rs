@@ -1,9 +1,9 @@
 //! Calls of the system on descriptors of placeholders.
 //!
-//! Each function returns `None` for a descriptor that stands for no socket of a test bed: then the call is one for the system. Errors have the numbers of Linux where
-//! Linux has the error. A call that would wait fails with [`io::ErrorKind::WouldBlock`] on a descriptor that does not block. On a blocking descriptor virtual time
-//! could not pass during the wait: the run fails with a text that names the host and the call, and the call itself with `EDEADLK`, so that the program goes on to
-//! where the run can end.
+//! Each function returns `None` for a descriptor without a socket of a test bed: the call is then for the system. Errors have the numbers of Linux where
+//! Linux has the error. A call that would wait fails with [`io::ErrorKind::WouldBlock`] on a non-blocking descriptor. On a blocking descriptor virtual time
+//! could not pass during the wait. Then the run fails with host and call in its text, and the call itself fails with `EDEADLK`, so that the program goes on to
+//! a place where the run can end.
 
 use std::io::{self, IoSlice, IoSliceMut};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr};
@@ -59,17 +59,17 @@ pub fn made(of: Numbered<'_>, kind: Type, version: Version) {
     table::insert(of, Virtual::New(kind, version), Vec::new());
 }
 
-/// Notes that the program has one more descriptor of the placeholder.
+/// Counts a further descriptor of the placeholder.
 pub fn duplicated(of: Numbered<'_>) {
     table::duplicated(of);
 }
 
-/// Notes that the program closes a descriptor. The last one closes the socket of the test bed.
+/// Notes the close of a descriptor. The close of the last descriptor closes the socket of the test bed.
 pub fn closed(of: Numbered<'_>) {
     table::closed(of);
 }
 
-/// Fails the run because of a call that would wait, or of another call that no test bed can serve. `what` completes the sentence about the call.
+/// Fails the run because of a call that would wait, or of a call beyond the abilities of a test bed. `what` completes the sentence about the call.
 ///
 /// # Errors
 ///
@@ -114,7 +114,7 @@ fn found(of: Numbered<'_>) -> Option<Found> {
             Virtual::Listener(held) => held.get().map(Found::Listener),
             Virtual::Datagrams(held) => held.get().map(Found::Datagrams),
             Virtual::Socket(socket) => {
-                // `connect` and `listen` consume a new socket. So the socket leaves the table for the call, and its successor is put back.
+                // `connect` and `listen` consume a new socket. So the socket leaves the table for the call, and the successor is put back.
                 let version = socket.version();
                 match std::mem::replace(&mut kept.socket, Virtual::New(Type::STREAM, version)) {
                     Virtual::Socket(socket) => Some(Found::Socket(socket)),
@@ -126,7 +126,7 @@ fn found(of: Numbered<'_>) -> Option<Found> {
     })
 }
 
-/// Puts a socket into the place of the former one.
+/// Puts a socket into the place of the former socket.
 fn put(of: Numbered<'_>, socket: Virtual) {
     let former = table::with(of, |kept| std::mem::replace(&mut kept.socket, socket));
     // Dropped after the borrow of the table has ended, because destructors are foreign.
@@ -214,7 +214,7 @@ pub fn listen(of: Numbered<'_>, backlog: i32) -> Option<io::Result<()>> {
     })
 }
 
-/// See `connect`. TCP takes at least a round trip, so that only a descriptor that does not block can connect.
+/// See `connect`. TCP takes at least a round trip, so only a non-blocking descriptor can connect.
 pub fn connect(of: Numbered<'_>, to: SocketAddr) -> Option<io::Result<()>> {
     let begin = |socket: Box<dyn Socket>| {
         let stream: Arc<dyn Stream> = socket.begin(to)?.into();
@@ -233,7 +233,7 @@ pub fn connect(of: Numbered<'_>, to: SocketAddr) -> Option<io::Result<()>> {
     })
 }
 
-/// Returns whether a connection is established. `meanwhile` is the error of a connection under way on a descriptor that does not block.
+/// Returns whether a connection is established. `meanwhile` is the error of a connection under way on a non-blocking descriptor.
 fn connected(of: Numbered<'_>, stream: &dyn Stream, meanwhile: i32) -> io::Result<()> {
     if stream.peer_addr().is_ok() {
         return Ok(());
@@ -247,7 +247,7 @@ fn connected(of: Numbered<'_>, stream: &dyn Stream, meanwhile: i32) -> io::Resul
     }
 }
 
-/// See `accept`. Returns a descriptor that does not block and is closed by `exec`, and the address of the peer.
+/// See `accept`. Returns a non-blocking descriptor that `exec` closes, and the address of the peer.
 pub fn accept(of: Numbered<'_>) -> Option<io::Result<(OwnedFd, SocketAddr)>> {
     Some(match found(of)? {
         Found::Listener(listener) => without_waiting(of, "accept", false, listener.try_accept()).and_then(|(stream, peer)| {
@@ -330,7 +330,7 @@ pub fn send(of: Numbered<'_>, name: &'static str, buffers: &[IoSlice<'_>], sendi
     })
 }
 
-/// Bytes that a call has received.
+/// Bytes received by a call.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Arrived {
     /// Number of bytes in the buffers.
@@ -388,7 +388,7 @@ fn receive_datagram(socket: &dyn Datagrams, buffers: &mut [IoSliceMut<'_>], peek
     Ok(arrived)
 }
 
-/// Takes over the options that the program has set on the placeholder. Must be called after the system has accepted an option.
+/// Takes over the options set by the program on the placeholder. Must be called after the system has accepted an option.
 ///
 /// # Errors
 ///
@@ -445,7 +445,7 @@ pub fn is_listening(of: Numbered<'_>) -> Option<bool> {
     table::with(of, |kept| matches!(kept.socket, Virtual::Listener(_)))
 }
 
-/// Returns the operations that would not wait, as `poll` reports them.
+/// Returns the operations without a wait, in the sense of `poll`.
 pub fn ready(of: Numbered<'_>) -> Option<io::Result<Ready>> {
     let only_readable = |readable| Ready { readable, ..Ready::default() };
     Some(match found(of)? {
@@ -455,7 +455,7 @@ pub fn ready(of: Numbered<'_>) -> Option<io::Result<Ready>> {
         Found::New(Type::DGRAM, _) => Ok(Ready { writable: true, ..Ready::default() }),
         Found::Socket(socket) => {
             put(of, Virtual::Socket(socket));
-            // Linux reports a socket of TCP that is not connected as hung up.
+            // Linux reports an unconnected socket of TCP as hung up.
             Ok(Ready { writable: true, write_closed: true, ..Ready::default() })
         }
         Found::New(..) | Found::Gone => Ok(Ready { writable: true, write_closed: true, ..Ready::default() }),

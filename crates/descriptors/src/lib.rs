@@ -1,12 +1,12 @@
-//! Descriptors of the system that stand for sockets of a test bed, and the calls of the system on these descriptors.
+//! Descriptors of the system in place of sockets of a test bed, and the calls of the system on such descriptors.
 //!
 //! Use this crate if you write a layer between programs and the sockets of a test bed, and the programs keep their sockets as descriptors.
 //!
-//! A [`Placeholder`] is a real socket, neither bound nor connected, that stands for a socket of a test bed. A program sets options on the placeholder, as on any
-//! socket, and the socket of the test bed takes the options over. The inode identifies a placeholder, because duplicates of a descriptor have the same inode. All
-//! placeholders of a thread stand in one table, and two layers enter placeholders there: the package `tokio` that `cohaptic tokio` writes, which gives descriptors of its sockets to
-//! programs and takes descriptors back, and `cohaptic-libc`, whose functions stand in for those of the system. The module [`calls`] has these functions in a form
-//! without pointers.
+//! A [`Placeholder`] is a real socket, neither bound nor connected, that stands for a socket of a test bed. A program sets options on the placeholder, as on
+//! any socket, and the socket of the test bed takes the options over. The inode identifies a placeholder, because duplicates of a descriptor have the same
+//! inode. All placeholders of a thread stand in one table. Two layers enter placeholders there: the package `tokio` of `cohaptic tokio`, which gives
+//! descriptors of its sockets to programs and takes descriptors back, and `cohaptic-libc`, whose functions stand in for functions of the system. The module
+//! [`calls`] has these functions in a form without pointers.
 //!
 //! ```
 //! # #[cfg(unix)] {

@@ -5,12 +5,12 @@ use std::io;
 use cohaptic_sockets::{Configured, KeepaliveTimes, Setting};
 use socket2::SockRef;
 
-/// Sets the options on `socket` that `now` has and `before` has not.
+/// Sets the options of `now` on `socket`, except for equal options of `before`.
 pub(crate) fn set_changed(socket: &(impl Configured + ?Sized), before: &[Setting], now: Vec<Setting>) -> io::Result<()> {
     now.into_iter().filter(|setting| !before.contains(setting)).try_for_each(|setting| socket.set(setting))
 }
 
-/// Returns the options of a real socket. Options that this kind of socket does not have are left out.
+/// Returns the options of a real socket. Options unknown to this kind of socket are left out.
 pub(crate) fn read(socket: &SockRef<'_>) -> Vec<Setting> {
     // The address tells the version of IP, also for an unbound socket.
     let is_six = socket.local_addr().is_ok_and(|address| address.is_ipv6());
@@ -43,7 +43,7 @@ pub(crate) fn write(socket: &SockRef<'_>, setting: Setting) -> io::Result<()> {
         Setting::Keepalive(Some(times)) => set_keepalive(socket, times),
         Setting::Linger(time) => socket.set_linger(time),
         Setting::UserTimeout(time) => set_user_timeout(socket, time),
-        // The system doubles the size that is set.
+        // The system doubles a set size.
         Setting::ReceiveBuffer(bytes) => socket.set_recv_buffer_size(bytes as usize / 2),
         Setting::SendBuffer(bytes) => socket.set_send_buffer_size(bytes as usize / 2),
         Setting::TypeOfService(value) if is_six => set_class(socket, value),
@@ -57,7 +57,7 @@ pub(crate) fn write(socket: &SockRef<'_>, setting: Setting) -> io::Result<()> {
     }
 }
 
-/// Options that only some systems have: reading and writing fail elsewhere.
+/// Options of some systems only: reading and writing fail elsewhere.
 macro_rules! some_have {
     ($(#[$condition:meta] $get:ident, $set:ident: $kind:ty = |$socket:ident| $read:expr, |$to:ident, $value:ident| $write:expr;)*) => {
         $(

@@ -16,7 +16,7 @@ use crate::table::{self, Kept, Kind, Numbered, Virtual};
 #[derive(Debug)]
 pub struct Placeholder {
     real: socket2::Socket,
-    /// Options of `real` when they were last taken over.
+    /// Options of `real` at the last takeover.
     before: Mutex<Vec<Setting>>,
     /// `true` if the program has asked for the descriptor since `before` was read.
     is_shown: AtomicBool,
@@ -44,7 +44,7 @@ impl Placeholder {
         self.real.as_fd()
     }
 
-    /// Sets the options on `socket` that the program has set on the placeholder since the last call.
+    /// Sets the options on `socket` that were set on the placeholder since the last call.
     pub fn take_over(&self, socket: &(impl Configured + ?Sized)) {
         // Reading all options takes a dozen calls of the system, and without a descriptor the program cannot have set any.
         if self.is_shown.swap(false, Ordering::Relaxed) {
@@ -86,7 +86,7 @@ impl<T: Kind + ?Sized> Pointer for Arc<T> {
 
 impl Pointer for Box<dyn Socket> {
     fn share(&self, _: &Placeholder) -> io::Result<()> {
-        // A socket that neither listens nor is connected has one owner.
+        // A socket before `listen` and `connect` has one owner.
         Ok(())
     }
 
@@ -136,7 +136,7 @@ pub fn find<T: Kind + ?Sized>(real: OwnedFd) -> io::Result<Option<(Arc<T>, Place
     Ok(Some((found, Placeholder { real: real.into(), before: Mutex::new(now), is_shown: AtomicBool::new(false) })))
 }
 
-/// Like [`find`], for sockets that have one owner.
+/// Like [`find`], for sockets with a single owner.
 ///
 /// # Errors
 ///
@@ -161,7 +161,7 @@ pub fn unbound(real: BorrowedFd<'_>) -> Option<Version> {
     (local.port() == 0 && local.ip().is_unspecified() && socket.peer_addr().is_err()).then_some(version)
 }
 
-/// Sets the options of `socket` in which the real socket of this kind differs from a new one.
+/// Sets the options of `socket` in which the real socket of this kind differs from a new socket.
 ///
 /// # Errors
 ///
@@ -183,7 +183,7 @@ fn fresh(kind: Type, version: Version) -> io::Result<socket2::Socket> {
     Ok(real)
 }
 
-/// Refuses a socket that would block, as the real tokio does.
+/// Refuses a blocking socket, like the real tokio.
 #[track_caller]
 #[expect(clippy::panic, reason = "as tokio's")]
 fn refuse_blocking(real: BorrowedFd<'_>) {

@@ -1,4 +1,4 @@
-//! Table of the sockets for which descriptors stand.
+//! Table of the sockets behind descriptors.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use cohaptic_sockets::{Bed, Configured, Datagrams, Listener, Setting, Socket, St
 use socket2::Type;
 
 thread_local! {
-    /// Sockets of test beds that ran on this thread, by the inode of the placeholder.
+    /// Sockets of test beds of this thread, by the inode of the placeholder.
     static KEPT: RefCell<BTreeMap<u64, Kept>> = const { RefCell::new(BTreeMap::new()) };
 }
 
@@ -49,12 +49,12 @@ impl AsRawFd for Numbered<'_> {
     }
 }
 
-/// Socket of a test bed for which a placeholder stands.
+/// Socket of a test bed behind a placeholder.
 #[derive(Debug)]
 pub enum Virtual {
-    /// Socket of this kind on which the program has called nothing yet. The options are those of the placeholder.
+    /// Socket of this kind before the first call. The placeholder has the options.
     New(Type, Version),
-    /// TCP socket that is neither connected nor listening.
+    /// TCP socket before `connect` and `listen`.
     Socket(Box<dyn Socket>),
     /// TCP connection, established or not.
     Stream(Held<dyn Stream>),
@@ -83,15 +83,15 @@ impl<T: ?Sized> Held<T> {
     }
 }
 
-/// Kind of socket that several owners share.
+/// Kind of socket with several owners.
 pub trait Kind: Configured + 'static {
     /// Returns the socket of this kind, or `None` for another kind, or if nobody owns the socket any more.
     fn of(socket: &Virtual) -> Option<Arc<Self>>;
 
-    /// Returns the form in which the table finds the socket and does not own the socket.
+    /// Returns the form for a table that finds the socket without owning the socket.
     fn shared(socket: &Arc<Self>) -> Virtual;
 
-    /// Returns the form in which the table owns the socket.
+    /// Returns the form for a table that owns the socket.
     fn owned(socket: Arc<Self>) -> Virtual;
 }
 
@@ -126,7 +126,7 @@ kinds! {
 pub(crate) struct Kept {
     bed: Weak<dyn Bed>,
     pub(crate) socket: Virtual,
-    /// Options of the placeholder when they were last taken over.
+    /// Options of the placeholder at the last takeover.
     pub(crate) before: Vec<Setting>,
     /// Number of descriptors of the placeholder. Stays 1 where nobody sees descriptors being duplicated and closed.
     pub(crate) descriptors: u32,
@@ -149,11 +149,11 @@ pub(crate) fn insert(of: Numbered<'_>, socket: Virtual, before: Vec<Setting>) {
         gone.extend(all.insert(of.inode, kept));
         gone
     });
-    // Sockets are dropped after the borrow has ended, because their destructors are foreign.
+    // Sockets are dropped after the borrow has ended, because destructors are foreign code.
     drop(gone);
 }
 
-/// Looks at the entry of a descriptor. `look` must call nothing that uses the table.
+/// Looks at the entry of a descriptor. `look` must not use the table.
 pub(crate) fn with<T>(of: Numbered<'_>, look: impl FnOnce(&mut Kept) -> T) -> Option<T> {
     // The table is gone while the thread ends. No test bed runs on the thread any more.
     KEPT.try_with(|all| all.borrow_mut().get_mut(&of.inode).map(look)).ok().flatten()
@@ -184,7 +184,7 @@ pub(crate) fn duplicated(of: Numbered<'_>) {
     });
 }
 
-/// Counts one descriptor of a placeholder less. The last one takes the entry away.
+/// Counts one descriptor of a placeholder less. The last descriptor takes the entry away.
 pub(crate) fn closed(of: Numbered<'_>) {
     let is_last = with(of, |kept| {
         kept.descriptors -= 1;
