@@ -8,7 +8,8 @@ use crate::axes::{length, to_scene};
 use crate::protocol::{Config, Device, FASTEST, Flaw, Format, Kinematics, PRESET};
 
 impl Client {
-    /// Takes the own device of a list of devices, and returns the flaw of its state. `answered`: instant of the latest message, if the list is the reply to this message.
+    /// Takes the own device of a list of devices, and returns the flaw of its state. `answered`: instant of the latest message, if the list is the reply to
+    /// this message.
     pub(super) fn take(&mut self, now: Instant, own: Option<&Device>, answered: Option<Instant>) -> Option<Flaw> {
         self.is_listed = own.is_some();
         let Some(device) = own else {
