@@ -9,7 +9,7 @@ use thiserror::Error;
 pub struct Limits {
     /// Greatest length of a force \[N\], 0 to 20.
     pub force: f64,
-    /// Fastest change of an admitted force \[N/s\], by the length of the change; above 0 and at most 10⁶. A force that the gate makes zero becomes zero at once.
+    /// Fastest change of an admitted force \[N/s\], by the length of the change; above 0 and at most 10⁶. The gate makes a force zero at once.
     pub slew: f64,
     /// Age of a setpoint above which the force is zero; above 0 and at most 1 s.
     pub setpoint_age: Duration,
