@@ -11,7 +11,7 @@ use rustix::net::sockopt::set_socket_linger;
 
 use super::*;
 
-/// No event takes that long, however busy the machine is.
+/// Time limit of a wait for an event, far above the time of any event on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Program inside with one connection.
@@ -69,7 +69,7 @@ fn each_direction_ends_by_itself() {
     inside.connection.shutdown();
     inside.until(|connection| connection.state() == State::FinWait2);
     let mut question = String::new();
-    // The bytes and the end have gone out, or do so while the gateway waits for nothing else.
+    // One more turn moves bytes and end that have not gone out yet.
     inside.until(|_| true);
     server.read_to_string(&mut question).unwrap();
     assert_eq!(question, "question");
@@ -137,7 +137,7 @@ fn a_port_without_a_server_is_refused() {
     assert_eq!(inside.connection.read(&mut [0]), Err(Error::ConnectionRefused));
 }
 
-/// Datagrams of one flow share a socket, and a flow that is silent for long is forgotten.
+/// Datagrams of one flow share a socket, and a flow is forgotten after a long silence.
 #[test]
 fn a_silent_flow_is_forgotten() {
     let server = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -173,7 +173,7 @@ fn packets_of_other_kinds_are_counted() {
     gateway.handle_packet(Instant::ZERO, &Packet::new(damaged, Framing::Ip));
     assert_eq!(gateway.dropped(), 3);
     assert!(gateway.poll_packet().is_none());
-    // A name server where the machine has none, and a segment of no connection.
+    // A question to a name server that the machine does not have, and a segment of no connection.
     let question = Packet::datagram(SocketAddr::new(HOST[0], 1), SocketAddr::new(NAMES[0], DNS), b"?").unwrap();
     gateway.handle_packet(Instant::ZERO, &question);
     assert_eq!(gateway.poll_packet().unwrap().bytes()[20..22], [3, 3]);

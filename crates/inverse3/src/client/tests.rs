@@ -121,7 +121,7 @@ fn without_a_middle_an_origin_is_needed() {
     assert!(old.refusal().unwrap().to_string().contains("version 3.1") && old.refusal().unwrap().to_string().contains("inverse3.origin"));
     assert!(request(&mut old, at(1), Format::V31).force.is_some());
     assert_eq!(refused(&old), (Phase::Refused(Refusal::NoPreset(V31)), true));
-    // A service of 3.5 that ignores the preset has a second.
+    // A service of 3.5 gets a second to apply the preset.
     let mut deaf = connected(ClientConfig::DEFAULT, V35, &["04C3"], UNCENTRED);
     sent(&mut deaf, at(1));
     deaf.receive(at(900), &reply(&["04C3"], UNCENTRED));

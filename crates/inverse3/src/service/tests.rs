@@ -30,7 +30,7 @@ fn texts(service: &mut Service, now: Instant) -> Vec<String> {
     found
 }
 
-/// Returns the texts that answer a message at 50 ms, with this fault at that time.
+/// Returns the replies to a message at 50 ms, with this fault at that time.
 fn answer(kind: FaultKind) -> Vec<String> {
     let mut service = service(vec![Fault::during(kind, at(40), Duration::from_millis(20))]);
     let session = service.connect(at(0)).unwrap();
@@ -100,7 +100,7 @@ fn a_force_moves_the_grip_until_the_device_idles() {
     let rest = service.position()[1];
     service.advance(at(600));
     assert!((service.position()[1] - rest).abs() < 1e-6);
-    // Another device is not this one.
+    // A force for another device has no effect.
     service.receive(at(600), session, &force([1.0; 3]).replace(ID, "1234"));
     assert_eq!(service.motor_force(), [0.0; 3]);
 }

@@ -20,7 +20,7 @@ fn serve(config: ServiceConfig) -> ServiceThread {
 }
 
 fn device(address: SocketAddr, mut config: ClientConfig) -> Inverse3 {
-    // A busy machine replies late. Only arming depends on that, and only here.
+    // A busy machine replies late. Only arming needs fresh readings here.
     config.limits.reading_age = Duration::from_secs(1);
     Inverse3::start(address, config, Duration::from_millis(1), || {}).unwrap()
 }

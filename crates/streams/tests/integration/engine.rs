@@ -38,7 +38,7 @@ fn a_sender_has_room_for_what_the_receiver_has_taken_and_for_all_of_the_relay() 
     assert_eq!(driver.engine.room(one, Side::Client), 100);
     driver.engine.handle_bytes(at(0), one, Side::Client, &[1; 80]);
     assert_eq!(driver.engine.room(one, Side::Client), 20);
-    // Of 150 bytes for all, 70 are left.
+    // The bound is 150 bytes for all connections, of which 80 are held.
     assert_eq!(driver.engine.room(two, Side::Client), 70);
     // The bytes have left the line, and the receiver takes 30 of them.
     driver.engine.handle_timeout(at(10));

@@ -47,7 +47,7 @@ impl Running {
     }
 }
 
-/// Starts a program that sends everything back, and ends a connection after the client has.
+/// Starts a program that sends everything back, and ends a connection after the client has ended it.
 fn echo() -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
