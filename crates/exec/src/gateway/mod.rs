@@ -89,6 +89,7 @@ impl Sockets {
     fn watch(&mut self, socket: impl AsFd, owner: Owner) -> io::Result<u64> {
         use epoll::EventFlags;
         let token = self.next_token;
+        // Edge-triggered, because a socket with room is nearly always writable and would wake the loop without end.
         let all = EventFlags::IN | EventFlags::OUT | EventFlags::RDHUP | EventFlags::ET;
         epoll::add(&self.epoll, socket, epoll::EventData::new_u64(token), all)?;
         self.next_token += 1;
@@ -162,6 +163,7 @@ impl Gateway {
         }
         for event in &events {
             let epoll::Event { flags, data } = *event;
+            // An earlier event of the same batch may have closed the socket of this event.
             let Some(owner) = self.sockets.owners.get(&data.u64()).copied() else { continue };
             match owner {
                 Owner::Tcp(ends) => self.tcp.handle_event(&mut self.sockets, self.now, ends, flags),

@@ -87,6 +87,7 @@ impl Relay {
                 Err(Broken) => return self.reset(now),
             }
         }
+        // With both ends of data passed on, the real connection is over. The connection inside still acknowledges and lingers by itself.
         if self.outward.is_shut && self.inward.is_shut {
             self.socket = None;
             self.connection.close(now);
@@ -153,6 +154,7 @@ fn pass_outward(
             Err(error) => return Err(error.into()),
         }
     }
+    // The system reports room once, after a refused write. So writing goes on until the socket refuses or nothing waits.
     while *may_write && !waiting.is_empty() {
         match socket.write(waiting.rest()) {
             Ok(count) => {

@@ -59,6 +59,7 @@ impl TcpTable {
         let Ok(segment) = Segment::parse(packet) else { return false };
         let ends = Ends { inside: segment.source, outside: segment.destination };
         match self.flows.get_mut(&ends) {
+            // A SYN may open a new connection with the ends of a connection in TIME-WAIT (RFC 6191). The arm for SYNs below then replaces the old connection.
             Some(Flow { stage: Stage::Open(relay), .. }) if !relay.connection.gives_way_to(&segment) => {
                 relay.connection.handle_segment(now, &segment);
                 self.settle(sockets, now, ends);
@@ -73,6 +74,7 @@ impl TcpTable {
                 self.remove(sockets, ends);
                 self.open(sockets, now, ends, segment.into_owned());
             }
+            // A host answers a segment of an unknown connection by a reset, so the gateway does the same for the real host.
             _ => refuse(sockets, &segment),
         }
         true
@@ -97,6 +99,7 @@ impl TcpTable {
         let Some(flow) = self.flows.get_mut(&ends) else { return };
         let Stage::Opening { syn, socket } = &flow.stage else { return };
         let failed = match socket.take_error() {
+            // Neither an error nor a peer: the socket still connects, and a later event comes here again.
             Ok(None) if socket.peer_addr().is_err() => return,
             Ok(error) => error,
             Err(error) => Some(error),
@@ -124,6 +127,7 @@ impl TcpTable {
     pub(super) fn handle_event(&mut self, sockets: &mut Sockets, now: Instant, ends: Ends, flags: EventFlags) {
         match self.flows.get_mut(&ends).map(|flow| &mut flow.stage) {
             Some(Stage::Open(relay)) => {
+                // After an error or a hang-up a read and a write return at once, with data, the end or the reason. So both are tried.
                 let is_over = flags.intersects(EventFlags::ERR | EventFlags::HUP);
                 relay.may_read |= is_over || flags.intersects(EventFlags::IN | EventFlags::RDHUP);
                 relay.may_write |= is_over || flags.contains(EventFlags::OUT);
@@ -178,6 +182,7 @@ impl TcpTable {
         if relay.is_over() {
             return self.remove(sockets, ends);
         }
+        // The set holds one deadline per connection, so the former deadline leaves the set before the new deadline enters.
         if flow.deadline != deadline {
             if let Some(before) = core::mem::replace(&mut flow.deadline, deadline) {
                 self.deadlines.remove(&(before, ends));

@@ -91,6 +91,7 @@ impl UdpTable {
         let any = if real.is_ipv4() { IpAddr::V4(Ipv4Addr::UNSPECIFIED) } else { IpAddr::V6(Ipv6Addr::UNSPECIFIED) };
         let socket = UdpSocket::bind((any, 0))?;
         socket.set_nonblocking(true)?;
+        // A connected socket takes answers from the asked address alone, and reports a closed port.
         socket.connect(real)?;
         let token = sockets.watch(&socket, Owner::Udp(ends))?;
         self.insert(sockets, now, ends, Way::Own { socket, token });
@@ -104,6 +105,7 @@ impl UdpTable {
             self.remove(sockets, oldest);
         }
         self.flows.insert(ends, Flow { way, used_at: now });
+        // A planned search stays: no new flow can be silent for long enough before this search.
         self.search_at.get_or_insert_with(|| now.saturating_add(IDLE));
     }
 

@@ -73,6 +73,7 @@ impl<'a> Watch<'a> {
     /// Starts each command for which all hosts before are ready.
     fn start_ready(&mut self) -> Result<(), Failed> {
         for place in 0..self.states.len() {
+            // No command starts after the run has begun to end.
             if self.states[place] == State::Waits && self.kill_at.is_none() {
                 let Some(host) = self.hosts[place] else { continue };
                 let started = host.start(!self.plan.hosts[place].is_piped);
@@ -131,6 +132,7 @@ impl<'a> Watch<'a> {
                     Some((Told::Started | Told::Device(_), _)) => {}
                     Some((Told::Ended(status), _)) => self.end(place, status),
                     Some((Told::Failed(status, why), _)) => return Err(named(self.plan, plan, Failed { status, why })),
+                    // A signal ends process 1 without a report if its command has not started, and a run that is ending needs no report any more.
                     None if self.states[place] == State::Waits || self.kill_at.is_some() => self.hosts[place] = None,
                     None => return Err(named(self.plan, plan, Failed::own("the process inside has ended without a word".to_owned()))),
                 }
