@@ -190,6 +190,7 @@ impl Engine {
         self.now = self.now.max(now);
         found.directions[from.index()].push(bytes);
         self.held += bytes.len();
+        // Pieces of the size of a segment leave one after the other, so that a large write is delayed like the segments of a real connection.
         for piece in bytes.chunks(PIECE) {
             line.offer(self.now, Piece { connection, what: What::Bytes(piece.len()) });
         }
@@ -211,6 +212,7 @@ impl Engine {
         self.now = self.now.max(now);
         let Some(found) = self.connections.get_mut(connection) else { return };
         let has_ended = std::mem::replace(&mut found.directions[from.index()].has_ended, true);
+        // A closed connection only waits for both ends, and a reset ends the wait. A repeated end changes nothing, but a reset can follow an end.
         if found.state != State::Open {
             if found.directions.iter().all(|direction| direction.has_ended) || end == End::Reset {
                 self.close(connection, Close::Ordinary);
@@ -312,8 +314,8 @@ impl Engine {
         }
     }
 
-    /// Returns the next due step. At equal instants a deadline of a connection comes before bytes arrive, so
-    /// that a fault at the age zero holds for the first byte too.
+    /// Returns the next due step. At equal instants a deadline of a connection comes before bytes arrive, so that a fault at the age zero holds for the first
+    /// byte too.
     fn next(&self) -> Next {
         let due = |at: Instant| (at <= self.now).then_some(at);
         let arrival = self.arrivals.first_key_value().and_then(|((at, _), (place, piece))| Some((due(*at)?, 1, Next::Arrival(*place, *piece))));
@@ -364,6 +366,7 @@ impl Engine {
         let now = self.now;
         let Some(found) = self.connections.get_mut(connection).filter(|found| found.state == State::Open) else { return };
         let direction = &mut found.directions[from.index()];
+        // During the gap between two pieces no event is due; the deadline at the end of the gap comes here again.
         if let Some(at) = direction.waits_for_gap(now) {
             self.timers.insert((at, connection, Timer::Gap(from)));
         } else if direction.writable(now).is_some() {
@@ -376,6 +379,7 @@ impl Engine {
         let Some(found) = self.connections.get_mut(connection).filter(|found| found.state == State::Open) else { return };
         let proxy = found.proxy;
         let direction = &found.directions[from.index()];
+        // The cut comes first: an end that arrives together with the cut must count as the fault.
         if direction.is_cut() {
             self.counts[proxy].cut_after += 1;
             self.finish_both(connection);
@@ -454,6 +458,7 @@ impl Engine {
             self.lines[found.line(from)].counts.lost += held as u64;
             self.held -= held;
         }
+        // No event may promise bytes that are lost now.
         self.ready.retain(|(ready, _)| *ready != connection);
     }
 
