@@ -56,7 +56,8 @@ impl Client {
         self.sent_force = admitted.force.newtons();
         // The negative of zero would be written as `-0`.
         let force = to_haply(self.sent_force).map(|part| part + 0.0);
-        // A service before 3.5 does not show its configuration again.
+        // Other programs may change the axes at any time, so the configuration is asked for again after a while. A service before 3.5 shows the configuration
+        // only once.
         let is_due = self.known.looked.is_none_or(|looked| now.saturating_duration_since(looked) >= LOOK);
         let is_new = self.format == Format::V35 && !self.known.is_placed;
         let full = self.format == Format::V35 && (is_new || is_due || self.is_doubtful);
@@ -64,6 +65,7 @@ impl Client {
         self.exchanges.send(now, self.sent_force, Some(admitted.verdict), self.format == Format::V35 && self.is_doubtful);
         self.is_pending = false;
         self.actions.push_back(Action::Send(request.write(self.format)));
+        // A service before 3.5 has no preset to wait for: the configured origin counts from the first message on.
         if self.format == Format::V31 && !self.known.is_placed {
             self.place_device(false);
         }

@@ -189,6 +189,7 @@ impl Client {
             Link::Leaving(until) if until <= now => self.leave(),
             Link::Open { heard } if now.saturating_duration_since(heard) >= SILENCE => self.drop_connection(now),
             Link::Open { .. } if self.next_message().is_some_and(|at| at <= now) => {
+                // The time for a doubtful reply is over as well: the replies count as lost, and the exchanges begin anew.
                 if self.is_doubtful {
                     self.exchanges.give_up();
                 }
@@ -249,6 +250,7 @@ impl Client {
             None => Form::Unknown,
         };
         let answered = self.exchanges.answer(form);
+        // Only the reply to the latest message ends a doubt: any other reply may belong to an earlier message.
         self.is_doubtful &= answered.is_none();
         let flaw = match &reply {
             Ok(_) => self.take(now, own, answered),
