@@ -240,6 +240,7 @@ fn connected(of: Numbered<'_>, stream: &dyn Stream, meanwhile: i32) -> io::Resul
     }
     match stream.take_error()? {
         Some(error) => Err(error),
+        // A connection under way is not established, and the call would wait for it on a blocking descriptor.
         None => match without_waiting::<()>(of, "connect", false, Err(io::ErrorKind::WouldBlock.into())) {
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => fail(meanwhile),
             outcome => outcome,
