@@ -100,6 +100,6 @@ impl Status {
         reading: None,
         force: [0.0; 3],
         motors: MotorCounts::ZERO,
-        verdict: Verdict::Zero(ZeroCause::NotHomed),
+        verdict: Verdict::Zero(ZeroCause::Gate(cohaptic_device::ZeroCause::NotReady)),
     };
 }

@@ -26,7 +26,7 @@ impl MotorCounts {
         let largest = counts.iter().fold(0.0_f64, |largest, count| largest.max(count.abs()));
         let limit = f64::from(MOTOR_LIMIT);
         let saturated = largest > limit;
-        // One factor for all motors keeps the direction of the force.
+        // A common factor for all motors keeps the direction of the force.
         let scale = if saturated { limit / largest } else { 1.0 };
         counts.iter().all(|count| count.is_finite()).then(|| (Self(counts.map(|count| whole(count * scale))), saturated))
     }

@@ -27,61 +27,41 @@ pub struct Moment {
 /// Reason why a force became zero, in the order of the checks.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum ZeroCause {
-    /// The gate was stopped, which is final.
-    Stopped,
-    /// The device is not homed, so the position of the grip has no meaning.
-    NotHomed,
-    /// The user has not switched forces on.
-    NotArmed,
-    /// The last report is too old, or no report has arrived.
-    StaleReading,
-    /// The last setpoint is too old, or no setpoint was given.
-    StaleSetpoint,
-    /// The loop has paused too long.
-    LoopLate,
-    /// A component of the force is infinite or NaN.
-    NotFinite,
+    /// The [`Gate`] of every device admitted no force. A Falcon that is not ready is not homed.
+    Gate(cohaptic_device::ZeroCause),
     /// No torques can make a force at the position of the grip.
     NoTorques,
 }
 
 impl ZeroCause {
     /// All causes, in the order of the checks.
-    pub const ALL: [Self; 8] =
-        [Self::Stopped, Self::NotHomed, Self::NotArmed, Self::StaleReading, Self::StaleSetpoint, Self::LoopLate, Self::NotFinite, Self::NoTorques];
+    pub const ALL: [Self; cohaptic_device::ZeroCause::ALL.len() + 1] = {
+        let mut all = [Self::NoTorques; cohaptic_device::ZeroCause::ALL.len() + 1];
+        let mut place = 0;
+        while place < cohaptic_device::ZeroCause::ALL.len() {
+            all[place] = Self::Gate(cohaptic_device::ZeroCause::ALL[place]);
+            place += 1;
+        }
+        all
+    };
 
     /// Returns the index in [`ZeroCause::ALL`].
     #[must_use]
     pub(crate) const fn index(self) -> usize {
-        self as usize
+        match self {
+            Self::Gate(cause) => cause.index(),
+            Self::NoTorques => cohaptic_device::ZeroCause::ALL.len(),
+        }
     }
 
     /// Returns the name in a few words.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Stopped => "stopped",
-            Self::NotHomed => "not homed",
-            Self::NotArmed => "not armed",
-            Self::StaleReading => "stale reading",
-            Self::StaleSetpoint => "stale setpoint",
-            Self::LoopLate => "loop late",
-            Self::NotFinite => "not finite",
+            // A user of a Falcon knows homing, not readiness.
+            Self::Gate(cohaptic_device::ZeroCause::NotReady) => "not homed",
+            Self::Gate(cause) => cause.name(),
             Self::NoTorques => "no torques",
-        }
-    }
-}
-
-impl From<cohaptic_device::ZeroCause> for ZeroCause {
-    fn from(cause: cohaptic_device::ZeroCause) -> Self {
-        match cause {
-            cohaptic_device::ZeroCause::Stopped => Self::Stopped,
-            cohaptic_device::ZeroCause::NotReady => Self::NotHomed,
-            cohaptic_device::ZeroCause::NotArmed => Self::NotArmed,
-            cohaptic_device::ZeroCause::StaleReading => Self::StaleReading,
-            cohaptic_device::ZeroCause::StaleSetpoint => Self::StaleSetpoint,
-            cohaptic_device::ZeroCause::LoopLate => Self::LoopLate,
-            cohaptic_device::ZeroCause::NotFinite => Self::NotFinite,
         }
     }
 }
@@ -160,7 +140,7 @@ impl ForceGate {
         let Moment { now, homed, armed, reading_at, setpoint_at, position } = *moment;
         let admitted = self.gate.admit(wanted, &cohaptic_device::Moment { now, ready: homed, armed, reading_at, setpoint_at });
         let changes = match admitted.verdict {
-            cohaptic_device::Verdict::Zero(cause) => return Self::zero(cause.into()),
+            cohaptic_device::Verdict::Zero(cause) => return Self::zero(ZeroCause::Gate(cause)),
             cohaptic_device::Verdict::Out(changes) => changes,
         };
         let motors = position.and_then(Jacobian::at).and_then(|jacobian| MotorCounts::of(admitted.force, &jacobian, &self.calibration));

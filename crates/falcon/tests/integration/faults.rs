@@ -1,5 +1,6 @@
 //! Faults of the connection, and their effects.
 
+use cohaptic_device::ZeroCause as Cause;
 use cohaptic_falcon::driver::{DriverConfig, DriverError, Phase};
 use cohaptic_falcon::protocol::{Buttons, Leds};
 use cohaptic_falcon::safety::ZeroCause;
@@ -129,7 +130,7 @@ fn a_device_that_falls_silent_gets_no_force_and_is_given_up() {
     let error = spring(&mut bench, 5.0).unwrap_err();
     assert!(matches!(error, DriverError::Silent { silence } if silence > seconds(1.0) && silence < seconds(1.1)), "{error:?}");
     assert!(bench.driver.now() - begin < seconds(1.1));
-    assert!(bench.driver.statistics().zeroed_by(ZeroCause::StaleReading) > 100);
+    assert!(bench.driver.statistics().zeroed_by(ZeroCause::Gate(Cause::StaleReading)) > 100);
     assert_eq!(bench.simulator.with(|device| device.motor_force()), [0.0; 3]);
     // The device answers again and is still homed, but a failed driver stays stopped.
     bench.simulator.with(|device| device.set_faults(Faults::NONE));
@@ -165,7 +166,7 @@ fn losing_one_encoder_ends_force_until_it_is_homed_and_armed_again() {
             })
             .unwrap();
         assert_eq!(bench.driver.status().phase, Phase::Homed);
-        assert!(bench.driver.statistics().zeroed_by(ZeroCause::NotArmed) > 100);
+        assert!(bench.driver.statistics().zeroed_by(ZeroCause::Gate(Cause::NotArmed)) > 100);
     }
 }
 

@@ -1,5 +1,6 @@
 //! Promises of safety.
 
+use cohaptic_device::ZeroCause as Cause;
 use cohaptic_falcon::calibration::MOTOR_LIMIT;
 use cohaptic_falcon::driver::{DriverConfig, Phase, Setpoint};
 use cohaptic_falcon::protocol::Leds;
@@ -32,7 +33,7 @@ fn a_force_that_is_no_number_is_no_force() {
             assert_eq!(counts(&bench), [0; 3]);
         }
     }
-    assert_eq!(bench.driver.statistics().zeroed_by(ZeroCause::NotFinite), 9);
+    assert_eq!(bench.driver.statistics().zeroed_by(ZeroCause::Gate(Cause::NotFinite)), 9);
 }
 
 #[test]
@@ -112,7 +113,7 @@ fn stopping_is_told_several_times_and_is_for_good() {
     bench.run(seconds(0.1), |_, _| Some([0.0, 1.0, 0.0])).unwrap();
     assert_eq!((counts(&bench), bench.driver.status().phase), ([0; 3], Phase::Stopped));
     bench.simulator.with(|device| assert_eq!((device.motor_force(), device.leds()), ([0.0; 3], Leds::RED)));
-    assert_eq!(bench.driver.statistics().zeroed_by(ZeroCause::Stopped), bench.driver.statistics().exchanges - before);
+    assert_eq!(bench.driver.statistics().zeroed_by(ZeroCause::Gate(Cause::Stopped)), bench.driver.statistics().exchanges - before);
 }
 
 #[test]
