@@ -265,8 +265,10 @@ impl Client {
         } else {
             self.flaws_in_a_row = 0;
         }
-        // The first message asks for the preset. Later a force may have waited for the reply.
-        if !self.exchanges.is_outstanding() && self.device_is_there() && (self.is_pending || self.known.asked.is_none()) {
+        // The first message asks for the preset. Later a force may have waited for the reply. A refusal has closed the connection, and no message follows the
+        // close.
+        let is_open = matches!(self.link, Link::Open { .. });
+        if is_open && !self.exchanges.is_outstanding() && self.device_is_there() && (self.is_pending || self.known.asked.is_none()) {
             self.message(now);
         }
     }
@@ -283,8 +285,18 @@ impl Client {
             // The device gives force again when its user has armed it again.
             Event::Stalled(_) => {}
         }
+        self.disarm(now);
+    }
+
+    /// Tells that no more events of the service arrive. Nobody would hear of the release of a brake, so that a brake ends here; the device must be armed anew.
+    pub fn events_ended(&mut self, now: Instant) {
+        self.is_braked = false;
+        self.disarm(now);
+    }
+
+    /// Disarms the device. Zero goes out at once, although a reply may be outstanding, and also to a device that the service has lost.
+    fn disarm(&mut self, now: Instant) {
         self.lose();
-        // Zero goes out at once, although a reply may be outstanding, and also to a device that the service has lost.
         if matches!(self.link, Link::Open { .. }) {
             self.message(now);
         }

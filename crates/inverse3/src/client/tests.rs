@@ -1,7 +1,7 @@
 use cohaptic_device::{Limits, Moment};
 
 use super::*;
-use crate::protocol::Request;
+use crate::protocol::{Flaw, Request};
 
 fn at(milliseconds: u64) -> Instant {
     Instant::from_nanos(1_000_000 * milliseconds)
@@ -112,6 +112,135 @@ fn forces_go_out_after_arming_and_wait_for_the_reply() {
     assert_eq!((client.snapshot(last).phase, client.snapshot(last).force), (Phase::Active, [0.0; 3]));
 }
 
+/// Returns a client whose device is armed and gives 0.5 N along x. The reply to its latest message came at 205 ms.
+fn active() -> Client {
+    let mut client = connected(ClientConfig::DEFAULT, V35, &["04C3"], CENTRED);
+    sent(&mut client, at(1));
+    client.receive(at(2), &reply(&["04C3"], CENTRED));
+    exchange(&mut client, 3, 206, [0.5, 0.0, 0.0]);
+    assert_eq!((client.snapshot(at(205)).phase, client.snapshot(at(205)).force), (Phase::Active, [0.5, 0.0, 0.0]));
+    client
+}
+
+#[test]
+fn forces_stay_within_the_limit_and_rise_from_zero() {
+    let mut client = active();
+    client.receive_event(at(206), &Event::Stalled("04C3".to_owned()));
+    sent(&mut client, at(206));
+    client.receive(at(207), &reply(&["04C3"], ""));
+    let forces: Vec<f64> = (208..420)
+        .map(|ms| {
+            exchange(&mut client, ms, ms + 1, [0.0, 8.0, 0.0]);
+            client.snapshot(at(ms)).force[1]
+        })
+        .collect();
+    let first = forces.iter().position(|force| *force != 0.0).unwrap();
+    assert!(first >= 199 && forces[first..first + 3] == [1.0, 2.0, 2.0], "{first}: {forces:?}");
+    assert_eq!(client.report().largest_force, 2.0);
+}
+
+#[test]
+fn readings_are_along_the_axes_of_a_scene() {
+    let mut client = connected(ClientConfig { origin: Some([0.01, 0.02, 0.03]), ..ClientConfig::DEFAULT }, V35, &["04C3"], CENTRED);
+    sent(&mut client, at(1));
+    client.receive(at(2), &reply(&["04C3"], CENTRED));
+    client.hold(at(2), GatedForce::ZERO);
+    let zero = r#"{"x":0,"y":0,"z":0}"#;
+    let moved = reply(&["04C3"], "")
+        .replace(&format!(r#""cursor_position":{zero}"#), r#""cursor_position":{"x":0.02,"y":0.04,"z":0.06}"#)
+        .replace(&format!(r#""cursor_velocity":{zero}"#), r#""cursor_velocity":{"x":1,"y":2,"z":3}"#);
+    // Later than a jump: a hand may move by 75 mm in 5 ms.
+    client.receive(at(7), &moved);
+    // To the right, up, and towards the user.
+    let reading = client.snapshot(at(7)).reading.unwrap().0;
+    assert!((0..3).all(|axis| (reading.position[axis] - [0.01, 0.03, -0.02][axis]).abs() < 1e-15), "{reading:?}");
+    assert_eq!(reading.velocity, [1.0, 3.0, -2.0]);
+}
+
+/// After a zero that did not wait for the reply before, only the reply with the configuration counts, which is the reply to the zero.
+#[test]
+fn a_late_reply_is_not_taken_for_the_reply_to_the_zero() {
+    let mut client = active();
+    client.hold(at(206), force([0.5, 0.0, 0.0]));
+    sent(&mut client, at(206));
+    let due = at(216) + Duration::from_nanos(1);
+    assert_eq!(client.poll_timeout(), Some(due));
+    client.handle_timeout(due);
+    let zero = request(&mut client, due, Format::V35);
+    assert_eq!((zero.force, zero.full), (Some([0.0; 3]), true));
+    assert_eq!((client.snapshot(due).force, client.snapshot(due).for_peer()), ([0.0; 3], None));
+    // The late reply, twice: no reading, and no force.
+    for ms in [217, 218] {
+        client.hold(at(ms), force([0.5, 0.0, 0.0]));
+        client.receive(at(ms), &reply(&["04C3"], ""));
+        assert!(sent(&mut client, at(ms)).is_empty() && client.snapshot(at(ms)).for_peer().is_none(), "{ms}");
+    }
+    client.receive(at(219), &reply(&["04C3"], CENTRED));
+    assert_eq!(client.snapshot(at(219)).reading.unwrap().1, due);
+    // The force that waited for the reply goes out with it.
+    assert_eq!(request(&mut client, at(219), Format::V35).force, Some([0.5, 0.0, 0.0]));
+    assert_eq!((client.report().older, client.report().unasked), (1, 1));
+}
+
+#[test]
+fn ten_bad_replies_in_a_row_close_the_connection() {
+    let mut client = active();
+    let bad = |client: &mut Client, ms: u64| {
+        client.hold(at(ms), force([0.5, 0.0, 0.0]));
+        assert_eq!(sent(client, at(ms)).len(), 1, "{ms}");
+        client.receive(at(ms), "no JSON");
+    };
+    (206..215).for_each(|ms| bad(&mut client, ms));
+    // A good reply begins the count anew.
+    exchange(&mut client, 215, 216, [0.5, 0.0, 0.0]);
+    (216..225).for_each(|ms| bad(&mut client, ms));
+    assert_eq!((client.poll_action(at(224)), client.snapshot(at(224)).phase), (None, Phase::Active));
+    bad(&mut client, 225);
+    // Zero goes out before the close: else the device would keep the force until it idles.
+    let Some(Action::Send(text)) = client.poll_action(at(225)) else { panic!("no zero") };
+    assert_eq!(Request::read(&text, Format::V35).unwrap().force, Some([0.0; 3]));
+    assert_eq!((client.poll_action(at(225)), client.poll_action(at(225))), (Some(Action::Close), None));
+    assert_eq!((client.snapshot(at(225)).phase, client.poll_timeout()), (Phase::Connecting, Some(at(475))));
+    assert_eq!((client.report().flaws[Flaw::NotJson.index()], client.report().losses), (19, 1));
+}
+
+#[test]
+fn an_event_sends_zero_at_once_although_a_reply_is_outstanding() {
+    let device = || "04C3".to_owned();
+    for event in [Event::Braked(device()), Event::Stalled(device()), Event::Disconnected(device())] {
+        let mut client = active();
+        client.hold(at(206), force([0.5, 0.0, 0.0]));
+        sent(&mut client, at(206));
+        client.receive_event(at(206), &Event::Braked("1234".to_owned()));
+        assert!(sent(&mut client, at(206)).is_empty() && client.snapshot(at(206)).phase == Phase::Active);
+        client.receive_event(at(206), &event);
+        assert_eq!(request(&mut client, at(206), Format::V35).force, Some([0.0; 3]), "{event:?}");
+        assert_eq!((client.snapshot(at(206)).force, client.report().losses), ([0.0; 3], 1), "{event:?}");
+        // A brake holds until its release, and then the device must be armed anew.
+        client.receive(at(207), &reply(&["04C3"], ""));
+        client.receive(at(208), &reply(&["04C3"], ""));
+        let phase = if matches!(event, Event::Braked(_)) { Phase::Braked } else { Phase::Disarmed };
+        assert_eq!(client.snapshot(at(208)).phase, phase, "{event:?}");
+        client.receive_event(at(209), &Event::Released(device()));
+        assert_eq!(client.snapshot(at(209)).phase, Phase::Disarmed, "{event:?}");
+    }
+}
+
+/// Nobody hears of the release of a brake once the events have ended: the device must be armed anew, and is not braked for ever.
+#[test]
+fn the_end_of_the_events_disarms() {
+    let mut client = active();
+    client.receive_event(at(206), &Event::Braked("04C3".to_owned()));
+    sent(&mut client, at(206));
+    client.receive(at(207), &reply(&["04C3"], ""));
+    client.events_ended(at(207));
+    assert_eq!(client.snapshot(at(207)).phase, Phase::Disarmed);
+    let mut client = active();
+    client.events_ended(at(206));
+    assert_eq!(request(&mut client, at(206), Format::V35).force, Some([0.0; 3]));
+    assert_eq!((client.snapshot(at(206)).phase, client.report().losses), (Phase::Disarmed, 1));
+}
+
 #[test]
 fn without_a_middle_an_origin_is_needed() {
     let refused = |client: &Client| (client.snapshot(at(2000)).phase, client.is_over());
@@ -128,8 +257,11 @@ fn without_a_middle_an_origin_is_needed() {
     assert_eq!(deaf.refusal(), None);
     deaf.hold(at(1001), GatedForce::ZERO);
     sent(&mut deaf, at(1001));
+    // A force that waits for the reply does not follow the close.
+    deaf.hold(at(1001), GatedForce::ZERO);
     deaf.receive(at(1001), &reply(&["04C3"], UNCENTRED));
     assert_eq!(deaf.refusal(), Some(Refusal::NoPreset(V35)));
+    assert_eq!((deaf.poll_action(at(1001)), deaf.is_over()), (Some(Action::Close), true));
     // With an origin, positions count from there: in Haply's axes 10 mm forward are −10 mm along z.
     let origin = ClientConfig { origin: Some([0.0, -0.01, 0.0]), ..ClientConfig::DEFAULT };
     let mut old = connected(origin, V31, &["04C3"], "");
@@ -171,6 +303,15 @@ fn pauses_before_a_new_connection_double_up_to_four_seconds() {
         assert_eq!(client.poll_action(now + Duration::from_millis(pause - 1)), None);
         now += Duration::from_millis(pause);
     }
+    // A service that has taken the preset ends the search: the next pause is short again.
+    assert_eq!(client.poll_action(now), Some(Action::Connect));
+    client.connected(now, V35);
+    for _ in 0..2 {
+        client.receive(now, &reply(&["04C3"], CENTRED));
+    }
+    client.closed(now);
+    assert_eq!(client.poll_timeout(), Some(now + PAUSES[0]));
+    now += PAUSES[0];
     // A silent service is left after a second.
     assert_eq!(client.poll_action(now), Some(Action::Connect));
     client.connected(now, V35);
@@ -181,21 +322,17 @@ fn pauses_before_a_new_connection_double_up_to_four_seconds() {
 
 #[test]
 fn a_stop_sends_zero_waits_and_closes() {
-    let active = || {
-        let mut client = connected(ClientConfig::DEFAULT, V35, &["04C3"], CENTRED);
-        sent(&mut client, at(1));
-        client.receive(at(2), &reply(&["04C3"], CENTRED));
-        exchange(&mut client, 3, 206, [0.5, 0.0, 0.0]);
-        assert_eq!(client.snapshot(at(205)).force, [0.5, 0.0, 0.0]);
+    let stopped = || {
+        let mut client = active();
         client.stop(at(206));
         assert_eq!(request(&mut client, at(206), Format::V35).force, Some([0.0; 3]));
         assert!(!client.is_over());
         client
     };
-    let mut answered = active();
+    let mut answered = stopped();
     answered.receive(at(207), &reply(&["04C3"], ""));
     assert_eq!((answered.poll_action(at(207)), answered.is_over()), (Some(Action::Close), true));
-    let mut silent = active();
+    let mut silent = stopped();
     assert_eq!(silent.poll_timeout(), Some(at(256)));
     silent.handle_timeout(at(256));
     assert_eq!((silent.poll_action(at(256)), silent.is_over()), (Some(Action::Close), true));

@@ -277,6 +277,7 @@ impl Driving {
                 Err(_) => {
                     self.events = None;
                     self.hears_events = false;
+                    self.client.events_ended(now);
                 }
             }
         }
