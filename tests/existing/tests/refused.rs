@@ -1,4 +1,4 @@
-//! What a test bed refuses, with a sentence that says what to do.
+//! Calls that a test bed refuses, with a sentence that says what to do.
 
 use cohaptic_testkit::{Bed, Testbed};
 use tokio::net::{TcpListener, TcpSocket, TcpStream, UdpSocket};

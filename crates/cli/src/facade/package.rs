@@ -209,7 +209,7 @@ fn write_real(folder: &Path, version: &str, sources: &Path, manifest: &Table) ->
         }
         files.write(&format!("src/{path}"), &text)?;
     }
-    // Where a text is missing, the code that the appended code calls has changed, and the package would fail to compile without a hint.
+    // If a text is missing, the code that the appended code calls has changed, and the package would fail to compile without a hint.
     if appended < APPENDED.len() {
         let text = format!(
             "tokio {version} is built in another way than the versions that this program knows: expected a newer cohaptic, or an older tokio"

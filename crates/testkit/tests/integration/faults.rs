@@ -147,7 +147,7 @@ fn a_way_that_is_cut_loses_what_is_sent_and_what_would_arrive_and_the_way_back_i
             both().await;
             time::sleep(2 * DELAY).await;
             assert_eq!((at_a.get(), at_b.get()), (3, 1));
-            // What was not handed to the link is not counted by it.
+            // The link counts only the datagrams that were handed to the link.
             assert_eq!(bed.link_stats("a", "b").offered(), 2);
         });
     }

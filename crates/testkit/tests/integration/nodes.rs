@@ -98,7 +98,7 @@ proptest! {
         let mut run = transfer(100, window).links(&words).seed(seed).start();
         run.run_while(|run| run.node::<GoBackN>("a").base < 100);
         prop_assert!(is_all_there(&run, 100));
-        // What is counted is the same from both sides.
+        // The counts of the link and of the nodes agree.
         let stats = run.link_stats("a", "b");
         prop_assert_eq!(stats.offered(), run.counts("a").sent);
         run.run_until_idle();

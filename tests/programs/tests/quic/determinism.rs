@@ -1,4 +1,4 @@
-//! What is the same twice, and what is not.
+//! Results that two runs share, and results that differ.
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! What RFC 9002 predicts: a packet-level model of its loss recovery and its congestion control (NewReno, appendices A and B), with random numbers of its own.
+//! Predictions of RFC 9002: a packet-level model of its loss recovery and its congestion control (NewReno, appendices A and B), with random numbers of its own.
 //!
 //! It shares no line with quinn, the emulator or the test bed. It leaves out what a long transfer does not feel: handshake packets, the search of the path's MTU, flow
 //! control, persistent congestion.
@@ -326,7 +326,7 @@ impl Model {
         if self.numbers.lost(self.path.loss) {
             return;
         }
-        // What waits, the packet on the line not counted.
+        // Bytes that wait, without the packet on the line.
         let service = 8.0 * self.path.datagram / self.path.rate_bits;
         let waiting = ((self.line_free - self.now) / service).ceil() - 1.0;
         if waiting > 0.0 && (waiting + 1.0) * self.path.datagram > self.path.queue {

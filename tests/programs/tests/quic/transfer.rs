@@ -18,11 +18,11 @@ const RATE: u64 = 20_000_000;
 const DELAY: Duration = Duration::from_millis(40);
 const QUEUE: u64 = 64_000;
 
-/// What quinn's search finds on a path that lets everything through, where it looks no further \[byte\]: an Ethernet frame with IPv6 and UDP.
+/// Size that quinn's search finds on a path that lets everything through, and with which the search ends \[byte\]: an Ethernet frame with IPv6 and UDP.
 const DATAGRAM: f64 = 1452.0;
 
-/// What a full datagram carries of a stream \[byte\]: 1 for the first byte of the header, 8 for the connection id, 2 for the packet number, 16 for the tag (RFC 9000,
-/// 17.3.1, RFC 9001, 5.3), and of the frame 1 for its type, 1 for the stream and 4 for an offset from 16,384 to 1,073,741,823 (19.8).
+/// Stream data in a full datagram \[byte\]. The datagram also has 1 for the first byte of the header, 8 for the connection id, 2 for the packet number, 16 for the tag
+/// (RFC 9000, 17.3.1, RFC 9001, 5.3), and of the frame 1 for its type, 1 for the stream and 4 for an offset from 16,384 to 1,073,741,823 (19.8).
 const PAYLOAD: f64 = DATAGRAM - 33.0;
 
 /// 20 Mbit/s, 40 ms one way, independent losses, a queue of 64 kB; both directions.

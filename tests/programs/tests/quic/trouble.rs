@@ -1,4 +1,4 @@
-//! What goes wrong on the way, and what QUIC makes of it.
+//! Faults on the way, and the answer of QUIC to each.
 
 use std::future::Future;
 use std::net::SocketAddr;

@@ -27,7 +27,7 @@ fn words_are_read_and_printed() {
         assert_eq!(said(text), [text]);
     }
     assert_eq!(said(" drop 1st syn;behind 2 packet 0-0 ; corrupt packet 1 "), ["drop first SYN", "behind 2 packet 0", "corrupt packet 1"]);
-    // What is no text is printed in digits.
+    // Bytes that are no text are printed in digits.
     assert_eq!(said("drop first packet with 0x22"), ["drop first packet with 0x22"]);
     assert_eq!(said("drop first packet with 0x6162"), ["drop first packet with \"ab\""]);
 }

@@ -15,7 +15,7 @@ fn comes_down_to(change: impl Fn(&mut Draft), network: &str, most: u32, fails: i
         let mut calm = Draft { duration: 100, ..Draft::calm(2) };
         change(&mut calm);
         let least = shrunk.least.draft();
-        // What is neither more nor less.
+        // Fields in which no value is worse than another.
         (calm.seed, calm.strategy, calm.split_mass) = (least.seed, least.strategy, least.split_mass);
         for (peer, found) in calm.peers.iter_mut().zip(&least.peers) {
             peer.name.clone_from(&found.name);
