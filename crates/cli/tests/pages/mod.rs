@@ -107,6 +107,7 @@ pages! {
     gallery_links: "docs/gallery-links.md",
     how_to_dev_dependency: "docs/how-to-dev-dependency.md",
     how_to_existing_program: "docs/how-to-existing-program.md",
+    how_to_flaky_test: "docs/how-to-flaky-test.md",
     how_to_keep_a_failure: "docs/how-to-keep-a-failure.md",
     how_to_measure_your_line: "docs/how-to-measure-your-line.md",
     how_to_ci: "docs/how-to-ci.md",
