@@ -31,6 +31,8 @@ pub struct Exchange {
     /// Bytes of IP inside the links.
     held_bytes: i64,
     departures: VecDeque<Departure>,
+    /// Numbers of the first dropped packets of each link, in the order of their drops, indexed by sender and receiver. At most [`MOST_NAMED`] per link.
+    dropped: BTreeMap<(NodeId, NodeId), Vec<u64>>,
     counts: Counts,
 }
 
@@ -69,6 +71,9 @@ pub struct Counts {
 const MOST_PACKETS: i64 = 262_144;
 const MOST_BYTES: i64 = 256 << 20;
 
+/// Dropped packets of a link that are remembered by number. Enough for a short test; the counters of the link count all.
+const MOST_NAMED: usize = 32;
+
 /// Time after which cross packets are computed without a packet to meet the cross packets, as in [`cohaptic_router::Engine`].
 const CATCH_UP: Duration = Duration::from_millis(10);
 
@@ -97,6 +102,7 @@ impl Exchange {
             held: vec![0; nodes.len()],
             held_bytes: 0,
             departures: VecDeque::new(),
+            dropped: BTreeMap::new(),
             counts: Counts::default(),
         }
     }
@@ -165,6 +171,13 @@ impl Exchange {
             let sign = if event.fate.is_end() { -1 } else { 1 };
             self.held[from] += sign;
             self.held_bytes += sign * bytes;
+            // The copies of a packet have the number of the packet, so that a dropped copy has no number of its own.
+            if matches!(event.fate, Fate::Dropped(_)) && event.copy == 0 {
+                let dropped = self.dropped.entry((event.path.from, event.path.to)).or_default();
+                if dropped.len() < MOST_NAMED {
+                    dropped.push(event.sequence);
+                }
+            }
             let Fate::Delivered(at) = event.fate else { continue };
             let PacketEvent { record, payload: mut packet, damage, part: _ } = event;
             if record.marked || damage.is_some() {
@@ -199,6 +212,13 @@ impl Exchange {
         self.network.link_stats(from, to)
     }
 
+    /// Returns the numbers of the packets that the link from one host to another dropped, in the order of the drops: the first 32 of them. Packets are numbered
+    /// from 0 on each link, as by the key `loss.packets`.
+    #[must_use]
+    pub fn dropped(&self, from: NodeId, to: NodeId) -> &[u64] {
+        self.dropped.get(&(from, to)).map_or(&[], Vec::as_slice)
+    }
+
     /// Returns the numbers of packets not taken by any link.
     #[must_use]
     pub const fn counts(&self) -> Counts {
@@ -219,8 +239,8 @@ mod tests {
 
     use super::*;
 
-    fn exchange(keys: &str) -> Exchange {
-        let model = link_from_keys(&keys.split(' ').map(str::to_owned).collect::<Vec<_>>()).unwrap();
+    fn exchange(keys: &[&str]) -> Exchange {
+        let model = link_from_keys(&keys.iter().map(|key| (*key).to_owned()).collect::<Vec<_>>()).unwrap();
         let node = |name: &str, address: [u8; 4]| Node { name: name.to_owned(), addresses: vec![address.into()] };
         let nodes = [node("a", [10, 0, 0, 1]), node("b", [10, 0, 0, 2]), node("world", [10, 0, 0, 3])];
         Exchange::new(1, &nodes, Some(2), |_, _| model.clone())
@@ -235,7 +255,7 @@ mod tests {
     /// A packet goes to the host of its address, and otherwise to the gateway. A packet to a multicast or broadcast address, or to its sender, goes nowhere.
     #[test]
     fn the_address_chooses_the_host() {
-        let mut exchange = exchange("delay=10ms");
+        let mut exchange = exchange(&["delay=10ms"]);
         for to in [[10, 0, 0, 2], [192, 0, 2, 7], [224, 0, 0, 1], [255, 255, 255, 255], [10, 0, 0, 1]] {
             exchange.handle_packet(Instant::ZERO, NodeId(0), datagram(to));
         }
@@ -248,13 +268,57 @@ mod tests {
         assert_eq!((exchange.in_flight(NodeId(0)), exchange.held_bytes()), (0, Bytes::new(0)));
     }
 
+    /// The link names the packets that it dropped, but not all packets of a long run.
+    #[test]
+    fn dropped_packets_are_named() {
+        let mut some = exchange(&["loss={packets=[1,3]}", "delay=1ms"]);
+        let mut all = exchange(&["loss=100%"]);
+        for exchange in [&mut some, &mut all] {
+            for _ in 0..40 {
+                exchange.handle_packet(Instant::ZERO, NodeId(0), datagram([10, 0, 0, 2]));
+            }
+        }
+        assert_eq!((some.dropped(NodeId(0), NodeId(1)), some.dropped(NodeId(1), NodeId(0))), (&[1, 3][..], &[][..]));
+        assert_eq!(all.dropped(NodeId(0), NodeId(1)), (0..32).collect::<Vec<_>>());
+    }
+
     #[test]
     fn a_lost_packet_and_a_copy_leave_nothing_behind() {
-        for keys in ["loss=100%", "delay=1ms duplicate=100%"] {
+        for keys in [&["loss=100%"][..], &["delay=1ms", "duplicate=100%"]] {
             let mut exchange = exchange(keys);
             exchange.handle_packet(Instant::ZERO, NodeId(0), datagram([10, 0, 0, 2]));
             exchange.handle_timeout(Instant::from_nanos(2_000_000));
-            assert_eq!((exchange.in_flight(NodeId(0)), exchange.held_bytes()), (0, Bytes::new(0)), "{keys}");
+            assert_eq!((exchange.in_flight(NodeId(0)), exchange.held_bytes()), (0, Bytes::new(0)), "{keys:?}");
         }
+    }
+
+    /// A packet and its copy share their bytes until one of the two is damaged.
+    #[test]
+    fn damage_changes_one_copy_alone() {
+        let mut exchange = exchange(&["duplicate=100%", "corrupt={ probability = \"50%\", checksum = \"passes\", bytes = \"28-31\" }"]);
+        let sent = datagram([10, 0, 0, 2]);
+        for _ in 0..200 {
+            exchange.handle_packet(Instant::ZERO, NodeId(0), sent.clone());
+        }
+        let departed: Vec<_> = std::iter::from_fn(|| exchange.poll_departure()).collect();
+        let changed = departed.iter().filter(|departure| departure.packet.bytes() != sent.bytes()).count() as u64;
+        assert_eq!((departed.len(), changed), (400, exchange.link_stats(NodeId(0), NodeId(1)).unwrap().damaged()));
+        // 200 ± 10, by the binomial law; five standard deviations.
+        assert!((150..=250).contains(&changed), "{changed}");
+    }
+
+    #[test]
+    fn congestion_is_marked_where_the_sender_understands_marks() {
+        let mut exchange = exchange(&["loss=100%", "mark-instead-of-loss=true"]);
+        let mut bytes = datagram([10, 0, 0, 2]).bytes().to_vec();
+        exchange.handle_packet(Instant::ZERO, NodeId(0), Packet::checked(bytes.clone()));
+        assert!(exchange.poll_departure().is_none());
+        // ECT(0) of RFC 3168. The checksum of the header becomes smaller by as much.
+        bytes[1] |= 2;
+        let checksum = u16::from_be_bytes([bytes[10], bytes[11]]) - 2;
+        bytes[10..12].copy_from_slice(&checksum.to_be_bytes());
+        exchange.handle_packet(Instant::ZERO, NodeId(0), Packet::checked(bytes));
+        let marked = exchange.poll_departure().unwrap();
+        assert!(marked.record.marked && marked.packet.bytes()[1] & 3 == 3, "{marked:?}");
     }
 }

@@ -51,4 +51,4 @@ pub use gateway::{DNS, GATEWAY, Gateway, NAMES, PREFIX, host};
 pub use host::Failed;
 pub use inside::{Setup, run as run_inside};
 pub use name_server::name_server;
-pub use session::{GatewayPlan, HostPlan, Line, Outcome, Plan, Report, Stream, capture_path, run};
+pub use session::{GatewayPlan, HostPlan, Line, LinkReport, Outcome, Plan, Report, Stream, capture_path, run};

@@ -27,6 +27,17 @@ pub(crate) fn passed_on() -> SigSet {
     [Signal::SIGHUP, Signal::SIGINT, Signal::SIGQUIT, Signal::SIGTERM, Signal::SIGUSR1, Signal::SIGUSR2].into_iter().collect()
 }
 
+/// Returns the number of a signal, as in messages and statuses.
+pub(crate) fn number(signal: Signal) -> u8 {
+    // Linux has 64 signals.
+    u8::try_from(signal as i32).unwrap_or(0)
+}
+
+/// Returns the exit status of a command that a signal has ended, as shells have it.
+pub(crate) fn status(signal: Signal) -> u8 {
+    128 + number(signal)
+}
+
 /// Reads the next signal.
 pub(crate) fn read(signals: &SignalFd) -> io::Result<Option<Got>> {
     /// `SI_KERNEL`: the kernel has sent the signal. The kernel sends the passed-on signals for a terminal only.

@@ -1,6 +1,7 @@
 //! Logical time driven by the wall clock.
 //!
-//! Use this crate if a state machine of yours must act on time by the wall clock. Clock, loop and sockets need Linux; [`Lateness`] and [`Recent`] do not.
+//! Use this crate if a state machine of yours must act on time by the wall clock. Clock, loop and sockets need Linux; [`Lateness`], [`Recent`] and [`own`] do
+//! not.
 //!
 //! The state machines of this project do not read a clock; a caller tells them the time. In virtual time the caller is a loop. In real time a [`Clock`] gives
 //! the time, a [`Pacer`] waits for the next deadline, and [`drive`] is the whole loop: it reads sockets, tells the time, sends and waits. A state machine is
@@ -41,6 +42,7 @@ mod clock;
 #[cfg(target_os = "linux")]
 mod drive;
 mod lateness;
+pub mod own;
 #[cfg(target_os = "linux")]
 mod pacer;
 mod recent;

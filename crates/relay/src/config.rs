@@ -1,9 +1,10 @@
 //! Configuration of a relay: topology, limits and timed changes of links. The checks here need neither a socket of the relay nor a clock.
 
 use core::time::Duration;
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
+use std::net::SocketAddr;
 
 use cohaptic_linkfile::{LinkTable, RelayFile, RelayLimits};
+use cohaptic_realtime::own::reaches;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{LinkModel, NodeId};
 
@@ -185,7 +186,8 @@ impl RelayConfig {
             Form::Mesh(mesh) => mesh.programs.iter().filter_map(|program| program.address).collect(),
             Form::Proxy(proxy) => vec![proxy.to],
         };
-        let own = |to: SocketAddr| ports.iter().find(|port| reaches(to, **port)).map(|port| ConfigError::ToItself { to, port: *port });
+        // A socket of IPv6 of the relay takes IPv6 alone: [::]:7000 and 127.0.0.1:7000 are different ports.
+        let own = |to: SocketAddr| ports.iter().find(|port| reaches(to, **port, false)).map(|port| ConfigError::ToItself { to, port: *port });
         targets.into_iter().find_map(own).map_or(Ok(()), Err)
     }
 
@@ -203,59 +205,6 @@ impl RelayConfig {
         match self.changes.iter().find(|change| !is_link(change.from, change.to)) {
             Some(Change { from, to, .. }) => Err(ConfigError::NoLink { from: *from, to: *to }),
             None => Ok(()),
-        }
-    }
-}
-
-/// Returns whether a datagram to `to` arrives at a socket of this machine bound to `port`.
-fn reaches(to: SocketAddr, port: SocketAddr) -> bool {
-    // The kernel delivers datagrams for an unspecified address to the loopback address of the same family.
-    let target = match (to.ip().to_canonical(), to.ip().is_ipv4()) {
-        (target, _) if !target.is_unspecified() => target,
-        (_, true) => IpAddr::V4(Ipv4Addr::LOCALHOST),
-        (_, false) => IpAddr::V6(Ipv6Addr::LOCALHOST),
-    };
-    // An IPv6 socket of the relay takes IPv6 alone: [::]:7000 and 127.0.0.1:7000 are different ports.
-    let own = port.ip().to_canonical();
-    let is_here = || if own.is_unspecified() { own.is_ipv4() == target.is_ipv4() && is_of_this_machine(target) } else { own == target };
-    // Port number 0 is not chosen yet. The relay checks again when the system has chosen.
-    to.port() == port.port() && port.port() != 0 && is_here()
-}
-
-/// Returns whether `ip` is an address of this machine: the system lets a socket be bound to the machine's own addresses alone.
-fn is_of_this_machine(ip: IpAddr) -> bool {
-    ip.is_loopback() || UdpSocket::bind((ip, 0)).is_ok()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// 192.0.2.1 is reserved for documentation (RFC 5737), so no machine has this address.
-    #[test]
-    fn a_port_is_known_by_each_of_its_names() {
-        let address = |text: &str| text.parse::<SocketAddr>().unwrap();
-        for (to, port) in [
-            ("127.0.0.1:7000", "127.0.0.1:7000"),
-            ("127.0.0.1:7000", "0.0.0.0:7000"),
-            ("127.0.0.2:7000", "0.0.0.0:7000"),
-            ("0.0.0.0:7000", "127.0.0.1:7000"),
-            ("0.0.0.0:7000", "0.0.0.0:7000"),
-            ("[::1]:7000", "[::]:7000"),
-            ("[::]:7000", "[::1]:7000"),
-            ("[::ffff:127.0.0.1]:7000", "127.0.0.1:7000"),
-        ] {
-            assert!(reaches(address(to), address(port)), "{to} {port}");
-        }
-        for (to, port) in [
-            ("127.0.0.1:7001", "127.0.0.1:7000"),
-            ("127.0.0.2:7000", "127.0.0.1:7000"),
-            ("127.0.0.1:7000", "[::]:7000"),
-            ("[::1]:7000", "0.0.0.0:7000"),
-            ("192.0.2.1:7000", "0.0.0.0:7000"),
-            ("127.0.0.1:0", "127.0.0.1:0"),
-        ] {
-            assert!(!reaches(address(to), address(port)), "{to} {port}");
         }
     }
 }

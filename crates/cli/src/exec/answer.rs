@@ -20,15 +20,19 @@ pub(super) fn describe(plan: &Plan, outcome: &Outcome) -> String {
         let ended = status.map_or_else(|| "was ended".to_owned(), |status| format!("ended with status {status}"));
         line(format!("{}: {} {ended}", host.name, command.join(" ")));
     }
-    let packets: u64 = report.links.iter().map(|(.., stats)| stats.offered()).sum();
+    let packets: u64 = report.links.iter().map(|link| link.stats.offered()).sum();
     line(format!("  {} in {}", Counted(packets, "packet"), Span::measured(report.elapsed)));
     line(format!("  the run is {}", report.validity));
     if report.release.count > 0 {
         line(format!("  release error: {}", late(&report.release)));
     }
-    for (from, to, stats) in &report.links {
-        let asked = ConfiguredDelay::of(plan.links.between(*from, *to));
-        line(format!("  {} -> {}: {}", report.nodes[*from], report.nodes[*to], carried(stats, &asked, &[])));
+    for link in &report.links {
+        let asked = ConfiguredDelay::of(plan.links.between(link.from, link.to));
+        let ends = format!("{} -> {}", report.nodes[link.from], report.nodes[link.to]);
+        line(format!("  {ends}: {}", carried(&link.stats, &asked, &[])));
+        if !link.dropped.is_empty() {
+            line(format!("  {ends} dropped packets = {:?}", link.dropped));
+        }
     }
     let untaken =
         [("to nobody in this network", report.untaken.no_host), ("malformed", report.untaken.malformed), ("overload", report.untaken.overload)];

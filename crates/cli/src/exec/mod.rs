@@ -47,7 +47,7 @@ fn try_exec(arguments: &ExecArguments) -> Result<u8, Failure> {
 
 /// Prints a line of a command's output, with the name of its host in front, on the stream to which the command has written.
 fn print(plan: &Plan, line: Line<'_>) {
-    // One call writes the whole line, so that lines of several hosts do not mix.
+    // A single call writes the whole line, so that lines of several hosts do not mix.
     let text = [plan.hosts[line.host].name.as_bytes(), b" | ", line.bytes, b"\n"].concat();
     // The commands run on to their end even if nobody reads the output any more, so a failed write is ignored.
     let _ = match line.stream {

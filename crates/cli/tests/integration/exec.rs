@@ -440,6 +440,11 @@ fn the_folder_gets_a_capture_and_a_report() {
     let has = |text: &[u8]| capture.windows(text.len()).any(|part| part == text);
     // The header of a packet from the command to the gateway, and back.
     assert!(has(b"sent") && has(b"delivered after 5ms") && has(&[10, 0, 2, 15, 10, 0, 2, 2]) && has(&[10, 0, 2, 2, 10, 0, 2, 15]));
+
+    // The report names the packets that were dropped, in the words that drop them again. The first one is a SYN, which is sent again.
+    said_by(&desk, "'loss={ packets = [0] }' --back 'delay 5ms' --out lost", &format!("echo host:{} 5000", server.port()));
+    let report = desk.read("lost/report.txt");
+    assert!(report.contains("\n  command -> world dropped packets = [0]\n") && !report.contains("world -> command dropped"), "{report}");
 }
 
 /// A file with a server and a client, whose further keys and commands are given.
@@ -507,6 +512,29 @@ fn the_main_host_or_the_first_failure_decides_the_status() {
     let begin = Instant::now();
     assert_eq!(desk.cohaptic_within(PATIENCE, "exec net.toml --no-priority").status, Some(0));
     assert!(begin.elapsed() >= Duration::from_secs(5));
+}
+
+/// A command that waits when a signal comes never starts, and the status does not say that it has succeeded.
+#[test]
+fn a_signal_ends_a_run_whose_main_command_still_waits() {
+    if !can_run() {
+        return;
+    }
+    let desk = Desk::new();
+    // A server that survives the signal to the whole group, by ignoring it, and one that ends well by it.
+    for (server, signal, status) in [
+        ("trap '' INT; echo up >&2; while :; do sleep 0.1; done", "-INT", 130),
+        ("trap 'exit 0' TERM; echo up >&2; while :; do sleep 0.1; done", "-TERM", 143),
+    ] {
+        desk.write("net.toml", net(&format!("command = \"{server}\"\nready = \"never\""), "command = \"echo started\"\nmain = true"));
+        let mut command = desk.command("exec net.toml --no-priority");
+        command.process_group(0);
+        let running = Running::begin(command);
+        running.said("server | up");
+        assert!(Command::new("kill").args([signal, "--", &format!("-{}", running.id())]).status().unwrap().success());
+        let outcome = running.end();
+        assert_eq!((outcome.status, outcome.stdout.as_str()), (Some(status), ""), "{server}: {outcome:?}");
+    }
 }
 
 /// With a world, hosts of a file reach the real machine over the links to the world.

@@ -140,7 +140,14 @@ impl TcpTable {
 
     /// Accepts the clients of a listener, and connects each to the host inside.
     pub(super) fn handle_clients(&mut self, sockets: &mut Sockets, now: Instant, place: usize) {
-        while let Some((Ok((socket, client)), port)) = self.listeners.get(place).map(|(listener, port)| (listener.accept(), *port)) {
+        while let Some((accepted, port)) = self.listeners.get(place).map(|(listener, port)| (listener.accept(), *port)) {
+            let (socket, client) = match accepted {
+                Ok(accepted) => accepted,
+                // A client that has left before its turn. The clients after it make no further event.
+                Err(error) if matches!(error.kind(), io::ErrorKind::ConnectionAborted | io::ErrorKind::Interrupted) => continue,
+                // Nobody is left, or the system has no descriptor: clients then wait for the next one.
+                Err(_) => return,
+            };
             let inside = SocketAddr::new(HOST[0], port);
             let gateway = |port| Ends { inside, outside: SocketAddr::new(address::gateway(inside.ip()), port) };
             // The server sees the client's own port if the port is free here, and otherwise the next free port.

@@ -159,7 +159,7 @@ fn a_silent_flow_is_forgotten() {
     assert_eq!((gateway.sockets.owners.len(), gateway.poll_timeout()), (0, None));
 }
 
-/// Whatever arrives from inside is dropped and counted, or answered.
+/// Packets from inside that are not passed on are dropped and counted, or answered.
 #[test]
 fn packets_of_other_kinds_are_counted() {
     use etherparse::PacketBuilder;

@@ -54,7 +54,7 @@ fn begin(setup: &Setup, channel: &Channel, command: &[OsString]) -> Result<std::
     let tun = Tun::open(&device).map_err(step)?;
     lead_all(&device).map_err(step)?;
     files::allow_ordinary_users();
-    files::name_hosts(setup).map_err(|(what, error)| refusal::words(&what, &error))?;
+    files::name_hosts(setup)?;
     let (descriptor, which) = tun.into_descriptor();
     let number = OFFLOADS.iter().position(|offloads| *offloads == which).and_then(|place| u8::try_from(place).ok()).unwrap_or(0);
     channel.report(&Report::Device(number), Some(descriptor.as_fd())).map_err(|error| format!("cannot hand over the device: {error}"))?;

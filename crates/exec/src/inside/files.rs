@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use nix::mount::{MsFlags, mount};
 
+use super::refusal;
 use super::setup::Setup;
 
 const NONE: Option<&str> = None;
@@ -29,8 +30,8 @@ pub(super) fn allow_ordinary_users() {
     let _ = fs::write("/proc/sys/net/ipv4/ip_unprivileged_port_start", "0");
 }
 
-/// Replaces /etc/hosts, /etc/resolv.conf and the line of hosts in /etc/nsswitch.conf. An error comes with the failed step.
-pub(super) fn name_hosts(setup: &Setup) -> Result<(), (String, io::Error)> {
+/// Replaces /etc/hosts, /etc/resolv.conf and the line of hosts in /etc/nsswitch.conf. The error names the failed step in words.
+pub(super) fn name_hosts(setup: &Setup) -> Result<(), String> {
     // Names stand for addresses of IPv4 alone. Many servers listen only there, and clients that try IPv6 first would be refused once.
     let v4 = || setup.addresses.iter().map(|network| network.address()).filter(|address| address.is_ipv4());
     let own = setup.name.iter().flat_map(|name| v4().map(move |address| (address, name.clone())));
@@ -49,30 +50,34 @@ fn plain_names(text: &str) -> String {
 }
 
 /// Puts another text in the place of a file of the machine, for this namespace alone. A missing file is not made.
-fn replace(path: &str, change: impl FnOnce(&str) -> String) -> Result<(), (String, io::Error)> {
-    let step = |what: &str| format!("{what} {path}");
+fn replace(path: &str, change: impl FnOnce(&str) -> String) -> Result<(), String> {
     if !Path::new(path).exists() {
         return Ok(());
     }
     // Bytes that are not UTF-8 occur only in comments of these files, so replacing such bytes changes no meaning.
-    let text = fs::read(path).map_err(|error| (step("read"), error))?;
-    let own = write_temporary(&change(&String::from_utf8_lossy(&text))).map_err(|error| (step("write a copy of"), error))?;
+    let text = fs::read(path).map_err(|error| format!("cannot read {path}: {error}"))?;
+    // A full disk or a closed folder has nothing to do with namespaces, about which `refusal` advises.
+    let folder = std::env::temp_dir();
+    let own = write_temporary(&folder, &change(&String::from_utf8_lossy(&text)));
+    let own = own.map_err(|error| format!("cannot write a copy of {path} into {}: {error}; TMPDIR names another folder", folder.display()))?;
     let mounted = mount(Some(&own), path, NONE, MsFlags::MS_BIND, NONE);
     // The mount keeps the content; the name is needed no longer.
     let _ = fs::remove_file(&own);
-    mounted.map_err(|error| (step("replace"), error.into()))
+    mounted.map_err(|error| refusal::words(&format!("replace {path}"), &error.into()))
 }
 
-/// Writes a file for all readers, under an unused name.
-fn write_temporary(text: &str) -> io::Result<PathBuf> {
-    let folder = std::env::temp_dir();
+/// Writes a file for all readers into `folder`, under an unused name. An error leaves no file.
+fn write_temporary(folder: &Path, text: &str) -> io::Result<PathBuf> {
     for number in 0..u32::MAX {
         let path = folder.join(format!("cohaptic-{}-{number}", std::process::id()));
         match OpenOptions::new().write(true).create_new(true).open(&path) {
             Ok(mut file) => {
-                file.write_all(text.as_bytes())?;
-                fs::set_permissions(&path, std::os::unix::fs::PermissionsExt::from_mode(0o644))?;
-                return Ok(path);
+                let written = file.write_all(text.as_bytes());
+                let done = written.and_then(|()| fs::set_permissions(&path, std::os::unix::fs::PermissionsExt::from_mode(0o644)));
+                if done.is_err() {
+                    let _ = fs::remove_file(&path);
+                }
+                return done.map(|()| path);
             }
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
             Err(error) => return Err(error),
@@ -93,7 +98,7 @@ mod tests {
 
     #[test]
     fn temporary_files_do_not_meet() {
-        let [one, other] = [(); 2].map(|()| write_temporary("text").unwrap());
+        let [one, other] = [(); 2].map(|()| write_temporary(&std::env::temp_dir(), "text").unwrap());
         assert_ne!(one, other);
         for path in [one, other] {
             assert_eq!(fs::read_to_string(&path).unwrap(), "text");

@@ -117,7 +117,7 @@ fn reap(child: Pid) -> io::Result<Option<u8>> {
     loop {
         let (pid, status) = match waitpid(None, Some(WaitPidFlag::WNOHANG)) {
             Ok(WaitStatus::Exited(pid, status)) => (pid, u8::try_from(status & 0xff).unwrap_or(OWN_FAILURE)),
-            Ok(WaitStatus::Signaled(pid, signal, _)) => (pid, 128 + u8::try_from(signal as i32).unwrap_or(0)),
+            Ok(WaitStatus::Signaled(pid, signal, _)) => (pid, signals::status(signal)),
             Ok(WaitStatus::StillAlive) | Err(nix::errno::Errno::ECHILD) => return Ok(found),
             Ok(_) | Err(nix::errno::Errno::EINTR) => continue,
             Err(error) => return Err(error.into()),

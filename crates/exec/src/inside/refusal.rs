@@ -27,7 +27,7 @@ pub(super) fn words(what: &str, error: &io::Error) -> String {
     let refused = format!("cannot {what}: {error}");
     if what.contains("/dev/net/tun") {
         return format!(
-            "{refused}\n/dev/net/tun must exist (`modprobe tun`; in a container `--device /dev/net/tun`) and be open to you; `cohaptic relay` needs no device"
+            "{refused}\n/dev/net/tun must exist (`modprobe tun`; in a container `--device /dev/net/tun`) and be open to you; `cohaptic relay`, for UDP or with `--tcp`, needs no device"
         );
     }
     let is_refusal = matches!(
@@ -52,7 +52,7 @@ fn way_out(folder: &Path) -> String {
     } else {
         format!("this system does not allow namespaces to ordinary users. As root, allow them with {}", found.join(" and "))
     };
-    format!("{first}; `cohaptic relay` passes datagrams of UDP without namespaces")
+    format!("{first}; without namespaces, `cohaptic relay` passes datagrams of UDP, and with `--tcp` connections")
 }
 
 #[cfg(test)]

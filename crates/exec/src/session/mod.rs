@@ -87,13 +87,26 @@ pub struct Outcome {
     pub report: Report,
 }
 
+/// Counters of a link at the end of a run.
+#[derive(Debug)]
+pub struct LinkReport {
+    /// Index of the sender among [`Report::nodes`].
+    pub from: usize,
+    /// Index of the receiver among [`Report::nodes`].
+    pub to: usize,
+    /// Counters.
+    pub stats: LinkStats,
+    /// Numbers of the first dropped packets, as by [`Exchange::dropped`](crate::Exchange::dropped).
+    pub dropped: Vec<u64>,
+}
+
 /// Counters of the network at the end of a run.
 #[derive(Debug)]
 pub struct Report {
     /// Length of the run.
     pub elapsed: Duration,
-    /// Counters of each link, with the indices of sender and receiver among [`Report::nodes`].
-    pub links: Vec<(usize, usize, LinkStats)>,
+    /// What passed each link.
+    pub links: Vec<LinkReport>,
     /// Names of the hosts, and of the gateway.
     pub nodes: Vec<String>,
     /// Packets not taken by any link.
@@ -203,9 +216,13 @@ fn report(plan: &Plan, emulation: &mut Emulation, prepared: Prepared) -> Report 
     let exchange = emulation.exchange();
     let nodes = exchange.names().to_vec();
     let pairs = (0..nodes.len()).flat_map(|from| (0..nodes.len()).map(move |to| (from, to)));
+    let link = |(from, to)| {
+        let (sender, receiver) = (NodeId::new(from), NodeId::new(to));
+        Some(LinkReport { from, to, stats: exchange.link_stats(sender, receiver)?, dropped: exchange.dropped(sender, receiver).to_vec() })
+    };
     Report {
         elapsed: emulation.elapsed().saturating_duration_since(Instant::ZERO),
-        links: pairs.filter_map(|(from, to)| Some((from, to, exchange.link_stats(NodeId::new(from), NodeId::new(to))?))).collect(),
+        links: pairs.filter_map(link).collect(),
         nodes,
         untaken: exchange.counts(),
         refused: emulation.refused().collect(),

@@ -97,26 +97,31 @@ impl<'a> Watch<'a> {
         if is_readable(self.outputs.as_fd())? { self.outputs.take_wake() } else { Ok(()) }
     }
 
-    fn pass_signals(&self) -> io::Result<()> {
+    fn pass_signals(&mut self) -> io::Result<()> {
         if !is_readable(self.signals.as_fd())? {
             return Ok(());
         }
         let Some(got) = signals::read(self.signals)? else { return Ok(()) };
-        if got.is_of_terminal {
-            return Ok(());
+        if !got.is_of_terminal {
+            // Process 1 then has the signal too, if it was sent to the whole group.
+            self.clock.block(Some(self.clock.now().saturating_add(signals::GROUP)), &[])?;
+            self.tell_all(got.signal);
         }
-        // After this wait process 1 has got the signal itself, if the signal was sent to the whole group.
-        self.clock.block(Some(self.clock.now().saturating_add(signals::GROUP)), &[])?;
-        self.tell_all(got.signal);
+        // A command that waits has no process for the signal. Its host ends as if the signal had ended the command, so that no command starts after Ctrl-C, and
+        // the status of the run does not say that a command has succeeded which never ran.
+        for place in 0..self.states.len() {
+            if self.states[place] == State::Waits {
+                self.end(place, signals::status(got.signal));
+            }
+        }
         Ok(())
     }
 
     /// Passes a signal to all running commands.
     fn tell_all(&self, signal: Signal) {
-        let number = u8::try_from(signal as i32).unwrap_or(0);
         for host in self.hosts.iter().flatten() {
             // A just ended host needs no signal.
-            let _ = host.channel.order(Order::Signal(number), None);
+            let _ = host.channel.order(Order::Signal(signals::number(signal)), None);
         }
     }
 
@@ -141,7 +146,8 @@ impl<'a> Watch<'a> {
         Ok(())
     }
 
-    /// Notes the end of a command. The end of the main command, or without a main command the first failure, ends the run: all other commands get SIGTERM.
+    /// Notes the end of a command, or of a host whose command never starts. The end of the main command, or without a main command the first failure, ends the
+    /// run: all other commands get SIGTERM.
     fn end(&mut self, place: usize, status: u8) {
         self.states[place] = State::Ended(status);
         self.hosts[place] = None;

@@ -6,6 +6,7 @@ use std::net::{Shutdown, SocketAddr};
 use std::time::Duration;
 
 use cohaptic_realtime::Lateness;
+use cohaptic_realtime::own::reaches;
 use cohaptic_units::Instant;
 use mio::net::{TcpListener, TcpStream};
 use mio::{Events, Interest, Poll, Token};
@@ -50,6 +51,8 @@ struct Pair {
     server: TcpStream,
     /// `false` until the program has accepted the connection.
     is_connected: bool,
+    /// `true` if the stream to the program has ended before the program has accepted the connection.
+    ends_once_connected: bool,
     /// Ends whose system buffer was full at the last write: client, server.
     is_full: [bool; 2],
 }
@@ -83,7 +86,8 @@ impl Sockets {
             listeners.push(listener);
         }
         let targets: Vec<SocketAddr> = config.proxies.iter().map(|proxy| proxy.to).collect();
-        if let Some(to) = targets.iter().find(|to| addresses.iter().any(|own| reaches(**to, *own))) {
+        // A listener at [::] takes clients of IPv4 too, on most systems.
+        if let Some(to) = targets.iter().find(|to| addresses.iter().any(|own| reaches(**to, *own, true))) {
             return Err(StreamsError::ToItself { to: *to });
         }
         Ok(Self {
@@ -186,7 +190,7 @@ impl Sockets {
         if self.pairs.len() <= id.slot() {
             self.pairs.resize_with(id.slot() + 1, || None);
         }
-        self.pairs[id.slot()] = Some(Pair { id, client, server, is_connected: false, is_full: [false; 2] });
+        self.pairs[id.slot()] = Some(Pair { id, client, server, is_connected: false, ends_once_connected: false, is_full: [false; 2] });
         Ok(())
     }
 
@@ -203,6 +207,9 @@ impl Sockets {
                 Ok(_) if !is_refused => {
                     let _ = pair.server.set_nodelay(true);
                     pair.is_connected = true;
+                    if pair.ends_once_connected {
+                        end_writing(&pair.server);
+                    }
                 }
                 // Not connected yet: some systems tell readiness too early.
                 Err(error) if !is_refused && error.kind() == ErrorKind::NotConnected => return,
@@ -304,24 +311,23 @@ impl Sockets {
     fn finish(&mut self, id: ConnectionId, sides: &[Side]) {
         let Some(pair) = self.pair(id) else { return };
         for side in sides {
-            // The call fails if the other program is gone, and a failure needs no answer.
-            let _ = pair.socket(*side).shutdown(Shutdown::Write);
+            if *side == Side::Server && !pair.is_connected {
+                // Linux gives up a connection that is shut down while it is opened, and tells nobody.
+                pair.ends_once_connected = true;
+            } else {
+                end_writing(pair.socket(*side));
+            }
         }
     }
+}
+
+/// Ends the stream to an end.
+fn end_writing(socket: &TcpStream) {
+    // The call fails if the other program is gone, and a failure needs no answer.
+    let _ = socket.shutdown(Shutdown::Write);
 }
 
 /// Makes the close of a socket a reset. If the system refuses, the close is an ordinary close.
 fn reset(socket: &TcpStream) {
     let _ = SockRef::from(socket).set_linger(Some(Duration::ZERO));
-}
-
-/// Returns whether a connection to `to` arrives at the listener with the address `own`, as far as the addresses tell.
-fn reaches(to: SocketAddr, own: SocketAddr) -> bool {
-    let (target, own_ip) = (to.ip().to_canonical(), own.ip().to_canonical());
-    let is_here = if own_ip.is_unspecified() {
-        target.is_loopback() || target.is_unspecified()
-    } else {
-        own_ip == target || (target.is_unspecified() && own_ip.is_loopback())
-    };
-    to.port() == own.port() && is_here
 }

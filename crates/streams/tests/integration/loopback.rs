@@ -121,6 +121,34 @@ fn a_client_of_a_program_that_nobody_runs_is_reset() {
     assert_eq!(relay.end().proxies[0].counts.refused, 1);
 }
 
+/// A client may end its stream before the program has accepted the connection. A listener whose queue is full lets the relay wait, on Linux.
+#[test]
+#[cfg(target_os = "linux")]
+fn the_end_of_a_client_that_comes_before_the_program_accepts_arrives_after() {
+    let socket = socket2::Socket::new(socket2::Domain::IPV4, socket2::Type::STREAM, None).unwrap();
+    socket.bind(&SocketAddr::from(([127, 0, 0, 1], 0)).into()).unwrap();
+    socket.listen(0).unwrap();
+    let listener = TcpListener::from(socket);
+    let address = listener.local_addr().unwrap();
+    // A queue of the length zero takes one connection.
+    let first = TcpStream::connect(address).unwrap();
+    let relay = Running::start("", "", address);
+    let mut client = relay.connect();
+    client.shutdown(Shutdown::Write).unwrap();
+    // Long enough for the end to reach the relay, and shorter than the system's wait before it asks the full listener again.
+    thread::sleep(Duration::from_millis(200));
+    drop((listener.accept().unwrap(), first));
+    let (mut server, _) = listener.accept().unwrap();
+    server.set_read_timeout(Some(PATIENCE)).unwrap();
+    server.write_all(b"greeting").unwrap();
+    assert_eq!(server.read(&mut [0; 9]).unwrap(), 0);
+    drop(server);
+    let mut greeting = Vec::new();
+    client.read_to_end(&mut greeting).unwrap();
+    assert_eq!(greeting, b"greeting");
+    assert_eq!(relay.end().proxies[0].counts.ended, 1);
+}
+
 #[test]
 fn reset_after_resets_and_close_after_closes() {
     let relay = Running::start("reset-after=30ms", "", echo());
