@@ -17,6 +17,7 @@ pub(crate) fn read(socket: &SockRef<'_>) -> Vec<Setting> {
     let size = |size: usize| u32::try_from(size).unwrap_or(u32::MAX);
     let type_of_service = if is_six { class(socket) } else { service(socket) };
     let ttl = if is_six { socket.unicast_hops_v6() } else { socket.ttl_v4() };
+    let multicast_loop = if is_six { socket.multicast_loop_v6() } else { socket.multicast_loop_v4() };
     let settings = [
         socket.tcp_nodelay().map(Setting::NoDelay),
         keepalive(socket).map(Setting::Keepalive),
@@ -30,6 +31,8 @@ pub(crate) fn read(socket: &SockRef<'_>) -> Vec<Setting> {
         reuse_port(socket).map(Setting::ReusePort),
         socket.only_v6().map(Setting::OnlyV6),
         socket.broadcast().map(Setting::Broadcast),
+        socket.multicast_ttl_v4().map(Setting::MulticastTtl),
+        multicast_loop.map(Setting::MulticastLoop),
     ];
     settings.into_iter().flatten().collect()
 }
@@ -54,6 +57,9 @@ pub(crate) fn write(socket: &SockRef<'_>, setting: Setting) -> io::Result<()> {
         Setting::ReusePort(on) => set_reuse_port(socket, on),
         Setting::OnlyV6(on) => socket.set_only_v6(on),
         Setting::Broadcast(on) => socket.set_broadcast(on),
+        Setting::MulticastTtl(ttl) => socket.set_multicast_ttl_v4(ttl),
+        Setting::MulticastLoop(on) if is_six => socket.set_multicast_loop_v6(on),
+        Setting::MulticastLoop(on) => socket.set_multicast_loop_v4(on),
     }
 }
 

@@ -47,12 +47,17 @@ pub(crate) fn guarded<T: Failing>(name: &str, serve: impl FnOnce() -> Option<io:
 
 /// Serves a call on a descriptor that stands for a socket of the test bed of this thread.
 pub(crate) fn on<T: Failing>(name: &str, fd: c_int, serve: impl FnOnce(Numbered<'_>) -> Option<io::Result<T>>) -> Option<T> {
-    caught(name, || with(fd, serve).flatten())
+    caught(name, || with(fd, |of| if calls::is_virtual(of) { serve(of) } else { None }).flatten())
 }
 
 /// Calls `act` with a descriptor of a socket and its inode. Returns `None` for another descriptor, and on a thread without placeholders.
 pub(crate) fn with<T>(fd: c_int, act: impl FnOnce(Numbered<'_>) -> T) -> Option<T> {
-    if fd < 0 || !calls::is_any() {
+    if calls::is_any() { numbered(fd, act) } else { None }
+}
+
+/// Like [`with`], also on a thread without placeholders.
+pub(crate) fn numbered<T>(fd: c_int, act: impl FnOnce(Numbered<'_>) -> T) -> Option<T> {
+    if fd < 0 {
         return None;
     }
     let mut seen = std::mem::MaybeUninit::<libc::stat>::uninit();

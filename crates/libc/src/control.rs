@@ -22,22 +22,13 @@ pub(crate) unsafe fn read(message: &msghdr) -> io::Result<Sending> {
     if message.msg_control.is_null() {
         return Ok(sending);
     }
-    // SAFETY: the control buffer is valid for its length.
-    let mut next = unsafe { libc::CMSG_FIRSTHDR(message) };
-    while !next.is_null() {
-        // SAFETY: `CMSG_FIRSTHDR` and `CMSG_NXTHDR` return null or a header that lies within the buffer.
-        let header = unsafe { next.read_unaligned() };
-        // SAFETY: the data follows the header.
-        let data = unsafe { libc::CMSG_DATA(next) };
-        // Number of bytes of data.
-        // SAFETY: the function computes with numbers only.
-        let length = header.cmsg_len.saturating_sub(unsafe { libc::CMSG_LEN(0) } as usize);
-        let room = (message.msg_control as usize + message.msg_controllen).saturating_sub(data as usize);
-        if length > room {
-            return fail(libc::EINVAL);
-        }
-        // SAFETY: the data lies within the buffer, as checked above.
-        let data = unsafe { crate::memory::bytes(data.cast(), length) };
+    // SAFETY: the caller promises the control buffer.
+    let mut rest = unsafe { crate::memory::bytes(message.msg_control, message.msg_controllen) };
+    // The headers are not read by `CMSG_NXTHDR`, which asks for an aligned buffer. Linux does not.
+    while rest.len() >= size_of::<cmsghdr>() {
+        // SAFETY: `rest` has the bytes of a header, every value of which is valid. Alignment is not asked for.
+        let header = unsafe { rest.as_ptr().cast::<cmsghdr>().read_unaligned() };
+        let Some(data) = rest.get(size_of::<cmsghdr>()..header.cmsg_len) else { return fail(libc::EINVAL) };
         match (header.cmsg_level, header.cmsg_type) {
             // Linux takes one byte as well as an `int`, whose first byte has the codepoint on little-endian machines.
             (libc::IPPROTO_IP, libc::IP_TOS) if data.len() == 1 => sending.ecn = data[0] & 3,
@@ -57,8 +48,7 @@ pub(crate) unsafe fn read(message: &msghdr) -> io::Result<Sending> {
             // `UDP_SEGMENT` is refused too, as by `setsockopt`.
             _ => return fail(libc::EINVAL),
         }
-        // SAFETY: `next` is a header within the buffer of the message.
-        next = unsafe { libc::CMSG_NXTHDR(message, next) };
+        rest = rest.get(header.cmsg_len.next_multiple_of(size_of::<usize>())..).unwrap_or_default();
     }
     Ok(sending)
 }
@@ -161,7 +151,7 @@ mod tests {
     #[test]
     fn written_messages_are_read() {
         let mut memory = [0_u64; 16];
-        let start = memory.as_mut_ptr().cast();
+        let start: *mut c_void = memory.as_mut_ptr().cast();
         let mut writer = Writer { start, room: 60, used: 0, is_cut: false };
         // SAFETY: the memory has 128 bytes, of which 60 are named.
         unsafe {
@@ -175,6 +165,15 @@ mod tests {
         // SAFETY: the message names the memory that was written.
         let sending = unsafe { read(&message(&mut memory, 56)) }.unwrap();
         assert_eq!(sending, Sending { to: None, from: Some([10, 0, 0, 3].into()), ecn: 2 });
+        // As with Linux, the buffer need not be aligned.
+        // SAFETY: the memory has 128 bytes, and the message names 56 of them after the first one.
+        let sending = unsafe {
+            memory.as_mut_ptr().cast::<u8>().copy_to(start.cast::<u8>().add(1), 56);
+            let mut unaligned = message(&mut memory, 56);
+            unaligned.msg_control = start.byte_add(1);
+            read(&unaligned)
+        };
+        assert_eq!(sending.unwrap().ecn, 2);
     }
 
     #[test]

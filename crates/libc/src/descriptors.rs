@@ -19,41 +19,35 @@ extern "C" fn close(fd: c_int) -> c_int {
     real!(close: extern "C" fn(c_int) -> c_int)(fd)
 }
 
-/// Notes a duplicate, if the system has made one.
-fn duplicate(fd: c_int, duplicate: impl FnOnce() -> c_int) -> Option<c_int> {
-    on("dup", fd, |of| {
-        if !calls::is_virtual(of) {
-            return None;
-        }
-        let made = duplicate();
-        if made < 0 {
-            return Some(Err(io::Error::last_os_error()));
-        }
-        calls::duplicated(of);
-        Some(Ok(made))
-    })
+/// Lets the system duplicate a descriptor, and counts the duplicate.
+fn duplicate(fd: c_int, real: impl FnOnce() -> c_int) -> io::Result<c_int> {
+    let made = real();
+    if made < 0 {
+        return Err(io::Error::last_os_error());
+    }
+    with(fd, calls::duplicated);
+    Ok(made)
 }
 
 /// See `dup(2)`.
 #[unsafe(no_mangle)]
 extern "C" fn dup(fd: c_int) -> c_int {
     let real = || real!(dup: extern "C" fn(c_int) -> c_int)(fd);
-    duplicate(fd, real).unwrap_or_else(real)
+    on("dup", fd, |_| Some(duplicate(fd, real))).unwrap_or_else(real)
 }
 
-/// Notes a duplicate that takes the place of another descriptor.
+/// Counts a duplicate that takes the place of another descriptor, and the descriptor that is gone.
 fn duplicate_to(fd: c_int, to: c_int, real: impl Fn() -> c_int) -> c_int {
-    // `dup2` of a descriptor to itself changes nothing.
-    if fd != to {
-        let _: Option<c_int> = on("dup2", to, |of| {
-            calls::closed(of);
-            None
-        });
-        if let Some(made) = duplicate(fd, &real) {
-            return made;
+    let served = caught("dup2", || {
+        // `dup2` of a descriptor to itself changes nothing.
+        if fd == to || !calls::is_any() {
+            return None;
         }
-    }
-    real()
+        // After the call the inode of `to` is another one. If the call fails, `to` stays open.
+        let replaced = with(to, |to| duplicate(fd, &real).inspect(|_| calls::closed(to)));
+        Some(replaced.unwrap_or_else(|| duplicate(fd, &real)))
+    });
+    served.unwrap_or_else(real)
 }
 
 /// See `dup2(2)`.
@@ -82,7 +76,7 @@ unsafe extern "C" fn fcntl(fd: c_int, command: c_int, argument: usize) -> c_int 
         unsafe { real(fd, command, argument) }
     };
     match command {
-        libc::F_DUPFD | libc::F_DUPFD_CLOEXEC => duplicate(fd, real).unwrap_or_else(real),
+        libc::F_DUPFD | libc::F_DUPFD_CLOEXEC => on("fcntl", fd, |_| Some(duplicate(fd, real))).unwrap_or_else(real),
         // The placeholder has the flags.
         _ => real(),
     }

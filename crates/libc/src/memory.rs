@@ -54,8 +54,9 @@ pub(crate) unsafe fn address(address: *const sockaddr, length: socklen_t) -> io:
     }
 }
 
-/// An address in the form of the C library.
+/// An address in the form of the C library. Both forms begin at the first byte.
 #[derive(Clone, Copy)]
+#[repr(C)]
 pub(crate) union Address {
     v4: sockaddr_in,
     v6: sockaddr_in6,

@@ -16,10 +16,14 @@ pub(crate) fn count(outcome: io::Result<usize>) -> io::Result<ssize_t> {
     outcome.map(|count| ssize_t::try_from(count).unwrap_or(ssize_t::MAX))
 }
 
-/// Returns the number of bytes that a receiving call returns.
-fn received(outcome: io::Result<Arrived>, flags: c_int) -> io::Result<ssize_t> {
+/// Returns the number of bytes that a receiving call reports.
+const fn reported(arrived: &Arrived, flags: c_int) -> usize {
     // With `MSG_TRUNC` a program asks for the length of the datagram.
-    count(outcome.map(|arrived| if flags & libc::MSG_TRUNC != 0 { arrived.length } else { arrived.count }))
+    if flags & libc::MSG_TRUNC != 0 { arrived.length } else { arrived.count }
+}
+
+fn received(outcome: io::Result<Arrived>, flags: c_int) -> io::Result<ssize_t> {
+    count(outcome.map(|arrived| reported(&arrived, flags)))
 }
 
 const fn dont_wait(flags: c_int) -> bool {
@@ -29,7 +33,7 @@ const fn dont_wait(flags: c_int) -> bool {
 /// Receives, without messages about errors of the socket (`MSG_ERRQUEUE`), of which a test bed has none.
 fn receive(of: Numbered<'_>, name: &str, into: &mut [IoSliceMut<'_>], flags: c_int) -> Option<io::Result<Arrived>> {
     if flags & libc::MSG_ERRQUEUE != 0 {
-        return calls::is_virtual(of).then(|| fail(libc::EAGAIN));
+        return Some(fail(libc::EAGAIN));
     }
     calls::receive(of, name, into, flags & libc::MSG_PEEK != 0, dont_wait(flags))
 }
@@ -61,9 +65,6 @@ unsafe extern "C" fn send(fd: c_int, start: *const c_void, length: size_t, flags
 #[unsafe(no_mangle)]
 unsafe extern "C" fn sendto(fd: c_int, start: *const c_void, length: size_t, flags: c_int, to: *const sockaddr, to_length: socklen_t) -> ssize_t {
     let served = on("sendto", fd, |of| {
-        if !calls::is_virtual(of) {
-            return None;
-        }
         let mut sending = Sending::default();
         if !to.is_null() {
             // SAFETY: the caller promises the address.
@@ -89,9 +90,6 @@ unsafe extern "C" fn sendto(fd: c_int, start: *const c_void, length: size_t, fla
 ///
 /// The pointers of `message` are valid as `sendmsg` asks for.
 unsafe fn send_message(of: Numbered<'_>, name: &'static str, message: &msghdr, flags: c_int) -> Option<io::Result<usize>> {
-    if !calls::is_virtual(of) {
-        return None;
-    }
     let prepare = || -> io::Result<_> {
         // SAFETY: the caller promises the control buffer.
         let mut sending = unsafe { control::read(message)? };
@@ -132,9 +130,6 @@ unsafe extern "C" fn sendmsg(fd: c_int, message: *const msghdr, flags: c_int) ->
 #[unsafe(no_mangle)]
 unsafe extern "C" fn sendmmsg(fd: c_int, messages: *mut mmsghdr, length: c_uint, flags: c_int) -> c_int {
     let served = on("sendmmsg", fd, |of| {
-        if !calls::is_virtual(of) {
-            return None;
-        }
         let mut sent = 0;
         for index in 0..length.min(1024) as usize {
             // SAFETY: the caller promises `length` messages, and nobody else uses them.
@@ -165,9 +160,6 @@ unsafe extern "C" fn sendmmsg(fd: c_int, messages: *mut mmsghdr, length: c_uint,
 #[unsafe(no_mangle)]
 unsafe extern "C" fn recv(fd: c_int, start: *mut c_void, length: size_t, flags: c_int) -> ssize_t {
     let served = on("recv", fd, |of| {
-        if !calls::is_virtual(of) {
-            return None;
-        }
         // SAFETY: the caller promises the memory.
         let room = unsafe { room(start, length) };
         receive(of, "recv", &mut [IoSliceMut::new(room)], flags).map(|outcome| received(outcome, flags))
@@ -194,9 +186,6 @@ unsafe extern "C" fn recvfrom(
     from_length: *mut socklen_t,
 ) -> ssize_t {
     let served = on("recvfrom", fd, |of| {
-        if !calls::is_virtual(of) {
-            return None;
-        }
         // SAFETY: the caller promises the memory.
         let room = unsafe { room(start, length) };
         let outcome = receive(of, "recvfrom", &mut [IoSliceMut::new(room)], flags)?.and_then(|arrived| {
@@ -219,9 +208,6 @@ unsafe extern "C" fn recvfrom(
 ///
 /// The pointers of `message` are valid as `recvmsg` asks for.
 unsafe fn receive_message(of: Numbered<'_>, name: &str, message: &mut msghdr, flags: c_int) -> Option<io::Result<Arrived>> {
-    if !calls::is_virtual(of) {
-        return None;
-    }
     // SAFETY: the caller promises the buffers.
     let outcome = match unsafe { rooms(message.msg_iov, message.msg_iovlen) } {
         Ok(mut rooms) => receive(of, name, &mut rooms, flags)?,
@@ -265,9 +251,6 @@ unsafe extern "C" fn recvmsg(fd: c_int, message: *mut msghdr, flags: c_int) -> s
 #[unsafe(no_mangle)]
 unsafe extern "C" fn recvmmsg(fd: c_int, messages: *mut mmsghdr, length: c_uint, flags: c_int, timeout: *mut libc::timespec) -> c_int {
     let served = on("recvmmsg", fd, |of| {
-        if !calls::is_virtual(of) {
-            return None;
-        }
         let mut arrived = 0;
         for index in 0..length.min(1024) as usize {
             // The error of an empty socket, or of a refused datagram, stays for the next call.
@@ -278,7 +261,7 @@ unsafe extern "C" fn recvmmsg(fd: c_int, messages: *mut mmsghdr, length: c_uint,
             let message = unsafe { &mut *messages.add(index) };
             // SAFETY: the caller promises the pointers of the message.
             match unsafe { receive_message(of, "recvmmsg", &mut message.msg_hdr, flags)? } {
-                Ok(one) => message.msg_len = c_uint::try_from(one.count).unwrap_or(c_uint::MAX),
+                Ok(one) => message.msg_len = c_uint::try_from(reported(&one, flags)).unwrap_or(c_uint::MAX),
                 Err(error) if arrived == 0 => return Some(Err(error)),
                 Err(_) => break,
             }
@@ -300,7 +283,7 @@ unsafe extern "C" fn recvmmsg(fd: c_int, messages: *mut mmsghdr, length: c_uint,
 /// As the function of the C library.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn sendfile64(to: c_int, from: c_int, offset: *mut libc::off64_t, length: size_t) -> ssize_t {
-    let served = on("sendfile64", to, |of| calls::is_virtual(of).then(|| fail(libc::EINVAL)));
+    let served = on("sendfile64", to, |_| Some(fail(libc::EINVAL)));
     served.unwrap_or_else(|| {
         let real = real!(sendfile64: unsafe extern "C" fn(c_int, c_int, *mut libc::off64_t, size_t) -> ssize_t);
         // SAFETY: the caller keeps the contract of the C library's function.
@@ -322,7 +305,7 @@ unsafe extern "C" fn splice(
     length: size_t,
     flags: c_uint,
 ) -> ssize_t {
-    let refused = |fd| on("splice", fd, |of| calls::is_virtual(of).then(|| fail(libc::EINVAL)));
+    let refused = |fd| on("splice", fd, |_| Some(fail(libc::EINVAL)));
     refused(from).or_else(|| refused(to)).unwrap_or_else(|| {
         let real = real!(splice: unsafe extern "C" fn(c_int, *mut libc::loff_t, c_int, *mut libc::loff_t, size_t, c_uint) -> ssize_t);
         // SAFETY: the caller keeps the contract of the C library's function.
@@ -338,9 +321,6 @@ unsafe extern "C" fn splice(
 #[unsafe(no_mangle)]
 unsafe extern "C" fn read(fd: c_int, start: *mut c_void, length: size_t) -> ssize_t {
     let served = on("read", fd, |of| {
-        if !calls::is_virtual(of) {
-            return None;
-        }
         // SAFETY: the caller promises the memory.
         let room = unsafe { room(start, length) };
         receive(of, "read", &mut [IoSliceMut::new(room)], 0).map(|outcome| received(outcome, 0))
@@ -360,9 +340,6 @@ unsafe extern "C" fn read(fd: c_int, start: *mut c_void, length: size_t) -> ssiz
 #[unsafe(no_mangle)]
 unsafe extern "C" fn readv(fd: c_int, list: *const libc::iovec, length: c_int) -> ssize_t {
     let served = on("readv", fd, |of| {
-        if !calls::is_virtual(of) {
-            return None;
-        }
         let Ok(length) = usize::try_from(length) else { return Some(fail(libc::EINVAL)) };
         // SAFETY: the caller promises the buffers.
         match unsafe { rooms(list, length) } {
@@ -404,9 +381,6 @@ unsafe extern "C" fn write(fd: c_int, start: *const c_void, length: size_t) -> s
 #[unsafe(no_mangle)]
 unsafe extern "C" fn writev(fd: c_int, list: *const libc::iovec, length: c_int) -> ssize_t {
     let served = on("writev", fd, |of| {
-        if !calls::is_virtual(of) {
-            return None;
-        }
         let Ok(length) = usize::try_from(length) else { return Some(fail(libc::EINVAL)) };
         // SAFETY: the caller promises the buffers.
         match unsafe { buffers(list, length) } {

@@ -29,7 +29,8 @@ const KINDS: [(c_int, c_int); 3] =
 
 type GetAddrInfo = unsafe extern "C" fn(*const c_char, *const c_char, *const addrinfo, *mut *mut addrinfo) -> c_int;
 
-/// See `getaddrinfo(3)`. Names are those of the hosts of the test bed, also on a thread for the blocking work of a host. Literal addresses are left to the C library.
+/// See `getaddrinfo(3)`. Names are those of the hosts of the test bed, also on a thread for the blocking work of a host. Literal addresses are left to the C
+/// library, and so is a name with `AI_NUMERICHOST`, which the C library refuses.
 ///
 /// # Safety
 ///
@@ -40,7 +41,9 @@ unsafe extern "C" fn getaddrinfo(node: *const c_char, service: *const c_char, hi
     // SAFETY: the caller promises a text with a zero at its end, or null.
     let name = if node.is_null() { None } else { unsafe { CStr::from_ptr(node) }.to_str().ok() };
     let is_in_bed = cohaptic_sockets::catches_calls() || !cohaptic_sockets::is_in_bed() && cohaptic_sockets::host().is_some();
-    let served = name.filter(|name| is_in_bed && !name.is_empty() && name.parse::<IpAddr>().is_err()).and_then(|name| {
+    // SAFETY: the caller promises hints, or null.
+    let is_numeric = unsafe { hints.as_ref() }.is_some_and(|hints| hints.ai_flags & libc::AI_NUMERICHOST != 0);
+    let served = name.filter(|name| is_in_bed && !is_numeric && !name.is_empty() && name.parse::<IpAddr>().is_err()).and_then(|name| {
         guarded("getaddrinfo", || {
             // SAFETY: the caller promises the service and the hints.
             let port = match unsafe { port(real, service, hints) } {
@@ -84,18 +87,16 @@ unsafe fn port(real: GetAddrInfo, service: *const c_char, hints: *const addrinfo
     let info = unsafe { list.read() };
     // SAFETY: the address is valid for its length.
     let address = unsafe { crate::memory::address(info.ai_addr, info.ai_addrlen) };
-    // SAFETY: the C library has made the list, and nobody else has it.
-    {
-        let real = real!(freeaddrinfo: unsafe extern "C" fn(*mut addrinfo));
-        // SAFETY: the caller keeps the contract of the C library's function.
-        unsafe { real(list) }
-    };
+    let free = real!(freeaddrinfo: unsafe extern "C" fn(*mut addrinfo));
+    // SAFETY: the C library has made the list, and nobody else has the list.
+    unsafe { free(list) };
     address.map(|address| address.port()).map_err(|_| libc::EAI_SERVICE)
 }
 
 /// Makes a list. Returns `None` if no address is of the family that the hints name.
 fn entries(addresses: &[SocketAddr], name: &str, hints: Option<&addrinfo>) -> Option<*mut addrinfo> {
     let (family, kind, flags) = hints.map_or((libc::AF_UNSPEC, 0, 0), |hints| (hints.ai_family, hints.ai_socktype, hints.ai_flags));
+    let is_wanted = |protocol| hints.is_none_or(|hints| hints.ai_protocol == 0 || hints.ai_protocol == protocol);
     let mut first: *mut addrinfo = null_mut();
     // From the last entry to the first, because each entry names the next one.
     for address in addresses.iter().rev() {
@@ -103,7 +104,7 @@ fn entries(addresses: &[SocketAddr], name: &str, hints: Option<&addrinfo>) -> Op
         if family != libc::AF_UNSPEC && family != of {
             continue;
         }
-        for (socktype, protocol) in KINDS.into_iter().rev().filter(|(socktype, _)| kind == 0 || kind == *socktype) {
+        for (socktype, protocol) in KINDS.into_iter().rev().filter(|(socktype, protocol)| (kind == 0 || kind == *socktype) && is_wanted(*protocol)) {
             let (address, length) = Address::of(*address);
             let info = addrinfo {
                 ai_flags: flags,
@@ -141,16 +142,12 @@ fn entries(addresses: &[SocketAddr], name: &str, hints: Option<&addrinfo>) -> Op
 /// As the function of the C library.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn freeaddrinfo(list: *mut addrinfo) {
-    // The lock is free before the C library is called, and no panic can come here.
+    // The lock is free again before the C library is called.
     let is_own = OWN.lock().unwrap_or_else(PoisonError::into_inner).remove(&(list as usize));
     if !is_own {
+        let real = real!(freeaddrinfo: unsafe extern "C" fn(*mut addrinfo));
         // SAFETY: the caller keeps the contract of the C library's function.
-        {
-            let real = real!(freeaddrinfo: unsafe extern "C" fn(*mut addrinfo));
-            // SAFETY: the caller keeps the contract of the C library's function.
-            unsafe { real(list) }
-        };
-        return;
+        return unsafe { real(list) };
     }
     let mut next = list;
     while !next.is_null() {
@@ -190,6 +187,13 @@ mod tests {
         // SAFETY: as above.
         unsafe { freeaddrinfo(list) };
         assert!(!OWN.lock().unwrap().contains(&(list as usize)));
+        hints.ai_protocol = libc::IPPROTO_UDP;
+        let list = entries(&addresses[1..], "server", Some(&hints)).unwrap();
+        // SAFETY: the list was made above.
+        let info = unsafe { list.read() };
+        assert_eq!((info.ai_socktype, info.ai_next), (libc::SOCK_DGRAM, null_mut()));
+        // SAFETY: as above.
+        unsafe { freeaddrinfo(list) };
         hints.ai_family = libc::AF_INET6;
         assert!(entries(&addresses[1..], "server", Some(&hints)).is_none());
     }

@@ -10,10 +10,17 @@ use libc::{c_int, c_void, socklen_t};
 use crate::caught::{on, real};
 use crate::memory::{bytes, fail, length_of};
 
-/// Returns whether a test bed does not have an option: the offloads of `UDP_SEGMENT` and `UDP_GRO`, and figures of a connection in the form of Linux. Programs
-/// that ask for such an option also run on systems without the option.
+/// Returns whether a test bed does not have an option: the offloads of `UDP_SEGMENT` and `UDP_GRO`, figures of a connection in the form of Linux, and groups
+/// that are joined by other options than those of [`membership`]. Programs that ask for these options do without where a system does not have them. The system
+/// itself would join the group on a real interface.
 fn is_missing(level: c_int, name: c_int) -> bool {
-    matches!((level, name), (libc::IPPROTO_UDP, libc::UDP_SEGMENT | libc::UDP_GRO) | (libc::IPPROTO_TCP, libc::TCP_INFO))
+    match level {
+        libc::IPPROTO_UDP => matches!(name, libc::UDP_SEGMENT | libc::UDP_GRO),
+        libc::IPPROTO_TCP => name == libc::TCP_INFO,
+        libc::IPPROTO_IP => matches!(name, libc::IP_ADD_SOURCE_MEMBERSHIP | libc::MCAST_JOIN_GROUP | libc::MCAST_JOIN_SOURCE_GROUP),
+        libc::IPPROTO_IPV6 => matches!(name, libc::MCAST_JOIN_GROUP | libc::MCAST_JOIN_SOURCE_GROUP),
+        _ => false,
+    }
 }
 
 /// See `getsockopt(2)`.
@@ -30,7 +37,7 @@ unsafe extern "C" fn getsockopt(fd: c_int, level: c_int, name: c_int, value: *mu
                 Err(error) => return Some(Err(error)),
             },
             (libc::SOL_SOCKET, libc::SO_ACCEPTCONN) => c_int::from(calls::is_listening(of)?),
-            _ if is_missing(level, name) && calls::is_virtual(of) => return Some(fail(libc::ENOPROTOOPT)),
+            _ if is_missing(level, name) => return Some(fail(libc::ENOPROTOOPT)),
             _ => return None,
         };
         if length.is_null() || value.is_null() {
@@ -63,9 +70,6 @@ unsafe extern "C" fn getsockopt(fd: c_int, level: c_int, name: c_int, value: *mu
 unsafe extern "C" fn setsockopt(fd: c_int, level: c_int, name: c_int, value: *const c_void, length: socklen_t) -> c_int {
     let real = real!(setsockopt: unsafe extern "C" fn(c_int, c_int, c_int, *const c_void, socklen_t) -> c_int);
     let served = on("setsockopt", fd, |of| {
-        if !calls::is_virtual(of) {
-            return None;
-        }
         if is_missing(level, name) {
             return Some(fail(libc::ENOPROTOOPT));
         }

@@ -9,41 +9,37 @@ use cohaptic_sockets::Version;
 use libc::{c_int, sockaddr, socklen_t};
 use socket2::Type;
 
-use crate::caught::{caught, guarded, on, real, with};
+use crate::caught::{caught, guarded, numbered, on, real, with};
 use crate::memory::{address, fail, return_address};
 
-/// Returns the version and the kind of a socket of IP for TCP or UDP.
-fn kind(domain: c_int, kind: c_int) -> Option<(Version, Type)> {
-    let version = match domain {
-        libc::AF_INET => Version::Four,
-        libc::AF_INET6 => Version::Six,
-        _ => return None,
-    };
-    match kind & !(libc::SOCK_NONBLOCK | libc::SOCK_CLOEXEC) {
-        libc::SOCK_STREAM => Some((version, Type::STREAM)),
-        libc::SOCK_DGRAM => Some((version, Type::DGRAM)),
+/// Returns the kind of a socket for TCP or UDP, or `None` for other protocols, such as ICMP.
+const fn kind(type_: c_int, protocol: c_int) -> Option<Type> {
+    match (type_ & !(libc::SOCK_NONBLOCK | libc::SOCK_CLOEXEC), protocol) {
+        (libc::SOCK_STREAM, 0 | libc::IPPROTO_TCP | libc::IPPROTO_MPTCP) => Some(Type::STREAM),
+        (libc::SOCK_DGRAM, 0 | libc::IPPROTO_UDP) => Some(Type::DGRAM),
         _ => None,
     }
 }
 
-/// See `socket(2)`. A socket of IP is a placeholder. On a thread for the blocking work of a host a socket of IP is refused, because the socket would
-/// reach the network of the system.
+/// See `socket(2)`. A socket for TCP or UDP is a placeholder. A socket of IP for another protocol is refused, and on a thread for the blocking work of a host
+/// every socket of IP: the socket would reach the network of the system.
 #[unsafe(no_mangle)]
 extern "C" fn socket(domain: c_int, type_: c_int, protocol: c_int) -> c_int {
     let real = || real!(socket: extern "C" fn(c_int, c_int, c_int) -> c_int)(domain, type_, protocol);
-    let Some((version, kind)) = kind(domain, type_) else { return real() };
+    let version = match domain {
+        libc::AF_INET => Version::Four,
+        libc::AF_INET6 => Version::Six,
+        _ => return real(),
+    };
     let made = caught("socket", || {
+        let Some(kind) = kind(type_, protocol) else { return Some(fail(libc::EPROTONOSUPPORT)) };
         let fd = real();
         if fd < 0 {
             return Some(Err(io::Error::last_os_error()));
         }
         // The table may be empty, so that `with` cannot be asked.
-        // SAFETY: the system has just opened the descriptor, which the caller gets only after this call.
-        let new = unsafe { std::os::fd::BorrowedFd::borrow_raw(fd) };
-        Some(cohaptic_descriptors::Numbered::of(new).map(|new| {
-            calls::made(new, kind, version);
-            fd
-        }))
+        numbered(fd, |new| calls::made(new, kind, version));
+        Some(Ok(fd))
     });
     made.unwrap_or_else(|| {
         if cohaptic_sockets::is_in_bed() || cohaptic_sockets::host().is_none() {
@@ -62,9 +58,6 @@ extern "C" fn socket(domain: c_int, type_: c_int, protocol: c_int) -> c_int {
 #[unsafe(no_mangle)]
 unsafe extern "C" fn bind(fd: c_int, at: *const sockaddr, length: socklen_t) -> c_int {
     let served = on("bind", fd, |of| {
-        if !calls::is_virtual(of) {
-            return None;
-        }
         // SAFETY: the caller promises the address.
         let at = match unsafe { address(at, length) } {
             Ok(at) => at,
@@ -94,9 +87,6 @@ extern "C" fn listen(fd: c_int, backlog: c_int) -> c_int {
 #[unsafe(no_mangle)]
 unsafe extern "C" fn connect(fd: c_int, to: *const sockaddr, length: socklen_t) -> c_int {
     let served = on("connect", fd, |of| {
-        if !calls::is_virtual(of) {
-            return None;
-        }
         // SAFETY: the caller promises the address.
         let to = match unsafe { address(to, length) } {
             Ok(to) => to,
@@ -206,7 +196,7 @@ extern "C" fn shutdown(fd: c_int, how: c_int) -> c_int {
             libc::SHUT_RD => Shutdown::Read,
             libc::SHUT_WR => Shutdown::Write,
             libc::SHUT_RDWR => Shutdown::Both,
-            _ => return calls::is_virtual(of).then(|| fail(libc::EINVAL)),
+            _ => return Some(fail(libc::EINVAL)),
         };
         calls::shut_down(of, how).map(|shut| shut.map(|()| 0))
     });

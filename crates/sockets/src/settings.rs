@@ -32,6 +32,10 @@ pub enum Setting {
     OnlyV6(bool),
     /// `SO_BROADCAST`.
     Broadcast(bool),
+    /// `IP_MULTICAST_TTL`.
+    MulticastTtl(u32),
+    /// `IP_MULTICAST_LOOP`, or `IPV6_MULTICAST_LOOP` of a socket of IPv6.
+    MulticastLoop(bool),
 }
 
 /// Times of keep-alive probes.

@@ -49,12 +49,6 @@ impl Host {
         IpAddr::from(self.addresses().v4)
     }
 
-    /// Returns whether the host has the address, by any of its interfaces.
-    #[cfg(feature = "quinn")]
-    pub(crate) fn has_address(&self, address: IpAddr) -> bool {
-        self.shared.with(|core| core.plan.has(self.node, Addresses::short(address), address.is_ipv6()))
-    }
-
     #[cfg(feature = "quinn")]
     pub(crate) const fn node(&self) -> NodeId {
         self.node

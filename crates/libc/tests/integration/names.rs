@@ -17,6 +17,12 @@ fn names_are_those_of_the_hosts() {
             assert_eq!(look_up("localhost"), ["[::1]:80", "127.0.0.1:80"]);
             assert_eq!(look_up("192.0.2.1"), ["192.0.2.1:80"]);
             assert!(("nobody", 80).to_socket_addrs().is_err());
+            // A program that wants no search for names gets none.
+            // SAFETY: hints of zeros are valid.
+            let hints = libc::addrinfo { ai_flags: libc::AI_NUMERICHOST, ..unsafe { std::mem::zeroed() } };
+            let mut list = std::ptr::null_mut();
+            // SAFETY: the texts end with zeros, and there is a place for the list.
+            assert_eq!(unsafe { libc::getaddrinfo(c"server".as_ptr(), c"80".as_ptr(), &raw const hints, &raw mut list) }, libc::EAI_NONAME);
         });
         client.await.unwrap();
     });

@@ -4,8 +4,8 @@ use std::io::IoSliceMut;
 use std::net::{IpAddr, UdpSocket};
 use std::time::Duration;
 
-use cohaptic_testkit::Bed;
 use cohaptic_testkit::time::sleep;
+use cohaptic_testkit::{Bed, Testbed};
 use quinn_udp::{BATCH_SIZE, EcnCodepoint, RecvMeta, Transmit, UdpSocketState};
 
 use crate::run;
@@ -52,4 +52,28 @@ fn codepoints_and_addresses_arrive() {
             client.await.unwrap();
         });
     }
+}
+
+/// A host with two interfaces sends from the address that the program names, whichever interface the host would choose.
+#[test]
+fn a_datagram_leaves_by_the_interface_of_its_address() {
+    Testbed::new(["phone", "server"]).interfaces("phone", ["wifi", "lte"]).run(async |bed: Bed| {
+        let server = bed.host("server").spawn(async {
+            let socket = UdpSocket::bind("0.0.0.0:7").unwrap();
+            sleep(Duration::from_millis(1)).await;
+            [(); 3].map(|()| socket.recv_from(&mut [0; 9]).unwrap().1.ip())
+        });
+        let phone = bed.host("phone");
+        let sent = phone.clone().spawn(async move {
+            let [lte, wifi] = ["lte", "wifi"].map(|name| IpAddr::from(phone.uplink(name).v4));
+            let socket = UdpSocket::bind("0.0.0.0:0").unwrap();
+            let state = UdpSocketState::new((&socket).into()).unwrap();
+            for src_ip in [Some(lte), Some(wifi), None] {
+                let transmit = Transmit { destination: "10.0.0.2:7".parse().unwrap(), ecn: None, contents: b"hello", segment_size: None, src_ip };
+                state.try_send((&socket).into(), &transmit).unwrap();
+            }
+            [lte, wifi, wifi]
+        });
+        assert_eq!(server.await.unwrap(), sent.await.unwrap());
+    });
 }

@@ -1,10 +1,11 @@
 use std::io::ErrorKind;
-use std::net::{SocketAddr, UdpSocket};
+use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
+use std::os::fd::AsRawFd;
 use std::time::Duration;
 
 use cohaptic_testkit::time::sleep;
 use cohaptic_testkit::{Bed, Testbed, UdpSocket as Virtual};
-use socket2::{Domain, Socket, Type};
+use socket2::{Domain, Protocol, SockRef, Socket, Type};
 
 use crate::run;
 
@@ -65,6 +66,49 @@ fn the_last_descriptor_closes_the_socket() {
     });
 }
 
+/// A duplicate in the place of another descriptor closes the socket there, and a duplicate that cannot be made closes nothing.
+#[test]
+fn a_descriptor_is_replaced_by_a_duplicate() {
+    run(async |bed: Bed| {
+        let client = bed.host("client").spawn(async {
+            let (first, second) = (bind("0.0.0.0:9"), bind("0.0.0.0:10"));
+            // SAFETY: the call takes numbers only.
+            let dup2 = |from: i32, to: i32| unsafe { libc::dup2(from, to) };
+            assert_eq!(dup2(-1, second.as_raw_fd()), -1);
+            assert_eq!(UdpSocket::bind("0.0.0.0:10").unwrap_err().kind(), ErrorKind::AddrInUse);
+            assert_eq!(dup2(first.as_raw_fd(), second.as_raw_fd()), second.as_raw_fd());
+            drop(bind("0.0.0.0:10"));
+            drop(first);
+            assert_eq!(UdpSocket::bind("0.0.0.0:9").unwrap_err().kind(), ErrorKind::AddrInUse);
+            assert_eq!(second.local_addr().unwrap().port(), 9);
+            drop(second);
+            drop(bind("0.0.0.0:9"));
+        });
+        client.await.unwrap();
+    });
+}
+
+/// A group is joined in the test bed, and by no option that would join the group on a real interface.
+#[test]
+fn multicast_has_the_options_of_the_placeholder() {
+    run(async |bed: Bed| {
+        let client = bed.host("client").spawn(async {
+            let (group, any) = (Ipv4Addr::new(224, 0, 0, 251), Ipv4Addr::UNSPECIFIED);
+            let socket = bind("0.0.0.0:5353");
+            let refused = SockRef::from(&socket).join_ssm_v4(&Ipv4Addr::new(10, 0, 0, 2), &Ipv4Addr::new(232, 0, 0, 1), &any);
+            assert_eq!(refused.unwrap_err().raw_os_error(), Some(libc::ENOPROTOOPT));
+            socket.join_multicast_v4(&group, &any).unwrap();
+            let mut buffer = [0; 9];
+            socket.send_to(b"all", (group, 5353)).unwrap();
+            assert_eq!(socket.recv(&mut buffer).unwrap(), 3);
+            socket.set_multicast_loop_v4(false).unwrap();
+            socket.send_to(b"all", (group, 5353)).unwrap();
+            assert_eq!(socket.recv(&mut buffer).unwrap_err().kind(), ErrorKind::WouldBlock);
+        });
+        client.await.unwrap();
+    });
+}
+
 #[test]
 fn errors_have_the_numbers_of_linux() {
     run(async |bed: Bed| {
@@ -73,6 +117,8 @@ fn errors_have_the_numbers_of_linux() {
             let to = |text: &str| text.parse::<SocketAddr>().unwrap();
             let number = |outcome: std::io::Result<usize>| outcome.unwrap_err().raw_os_error().unwrap();
             assert_eq!(number(socket.send(b"x")), libc::EDESTADDRREQ);
+            let ping = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::ICMPV4));
+            assert_eq!(ping.unwrap_err().raw_os_error(), Some(libc::EPROTONOSUPPORT));
             assert_eq!(number(socket.send_to(b"x", to("255.255.255.255:1"))), libc::EACCES);
             socket.set_broadcast(true).unwrap();
             socket.send_to(b"x", to("255.255.255.255:1")).unwrap();

@@ -26,6 +26,8 @@ const fn is_too_long(len: usize, is_six: bool) -> bool {
 pub(crate) struct Outgoing<'a> {
     /// Address of the receiver. `None` stands for the peer of a connected socket.
     pub(crate) to: Option<&'a SocketAddr>,
+    /// Address of the host from which this datagram leaves. `None` stands for the address of the socket.
+    pub(crate) from: Option<IpAddr>,
     pub(crate) bytes: &'a [u8],
     /// ECN codepoint of the datagram.
     pub(crate) ecn: Ecn,
@@ -57,7 +59,7 @@ pub(super) struct Route {
 impl Core {
     /// Sends a datagram at the present instant.
     #[inline(always)]
-    pub(crate) fn send(&mut self, id: SocketId, Outgoing { to, bytes, ecn }: Outgoing<'_>) -> io::Result<()> {
+    pub(crate) fn send(&mut self, id: SocketId, Outgoing { to, from, bytes, ecn }: Outgoing<'_>) -> io::Result<()> {
         self.note_call(|core| core.sockets.get(id).name());
         let socket = self.sockets.get(id);
         if socket.has_error() {
@@ -83,14 +85,18 @@ impl Core {
             return Errno::TooLong.fail();
         }
         let (host, from_port) = (socket.host, socket.port.number());
+        let at = match from {
+            None => socket.at,
+            Some(from) => Some(self.named_source(host, from, is_six)?),
+        };
         match self.plan.owner_of(number, is_six) {
             Some(receiver) if receiver != host => {
-                let from = self.source_to_host(socket, number, to)?;
+                let from = self.source_to_host(host, at, number, to)?;
                 let parcel = self.spare.copied(Ends::of([from, number], [from_port, to_port], is_six, Kind::Datagram), bytes, ecn);
                 self.offer(Path { from: host, to: receiver }, parcel);
             }
             _ => {
-                let route = self.route(socket, to)?;
+                let route = self.route(socket, at, to)?;
                 self.send_within(id, route, [from_port, to_port], is_six, bytes, ecn);
             }
         }
@@ -124,35 +130,46 @@ impl Core {
         }
     }
 
-    /// Returns the way of a datagram of `socket` to the address `to`, which the socket can send to.
+    /// Returns the source address that a program names for one datagram, as [`Addresses::short`].
+    ///
+    /// # Errors
+    ///
+    /// `EINVAL`, as with Linux, for an address that the host does not have, and for the other version of IP.
+    #[cold]
+    fn named_source(&self, host: NodeId, from: IpAddr, is_six: bool) -> io::Result<u32> {
+        let short = Addresses::short(from);
+        if from.is_ipv6() == is_six && self.plan.is_own(host, short, is_six) { Ok(short) } else { Errno::InvalidInput.fail() }
+    }
+
+    /// Returns the way of a datagram of `socket`, sent from `at`, to the address `to`, which the socket can send to. `at` is as in [`Core::source`].
     ///
     /// # Errors
     ///
     /// If the network cannot be reached from the address of the socket, or the socket may not broadcast.
     #[inline(never)]
-    pub(super) fn route(&self, socket: &SocketState, to: &SocketAddr) -> io::Result<Route> {
+    pub(super) fn route(&self, socket: &SocketState, at: Option<u32>, to: &SocketAddr) -> io::Result<Route> {
         // An address of a host belongs to no other kind of address. Most datagrams go to such an address, so the other kinds are tried only afterwards.
         let mut number = Addresses::short(to.ip());
         if self.plan.owner_of(number, to.is_ipv6()).is_some() {
-            return Ok(Route { from: self.source_to_host(socket, number, to)?, to: number, receivers: Receivers::One });
+            return Ok(Route { from: self.source_to_host(socket.host, at, number, to)?, to: number, receivers: Receivers::One });
         }
         let receivers = self.other_receivers(socket.host, to, &mut number)?;
-        let from = self.source(socket.host, socket.at, number, to)?;
+        let from = self.source(socket.host, at, number, to)?;
         if matches!(receivers, Receivers::All) && !socket.may_broadcast {
             return Errno::PermissionDenied.fail();
         }
         Ok(Route { from, to: number, receivers })
     }
 
-    /// Returns the source address of a socket that sends to the address `number` of a host, given by the program as `to`. Unlike with [`Core::source`], the
+    /// Returns the source address of a socket at `at` that sends to the address `number` of a host, given by the program as `to`. Unlike with [`Core::source`], the
     /// address is no address of loopback.
     #[inline(always)]
-    fn source_to_host(&self, socket: &SocketState, number: u32, to: &SocketAddr) -> io::Result<u32> {
-        match socket.at {
-            None => Ok(self.plan.short(socket.host, to.is_ipv6())),
+    fn source_to_host(&self, host: NodeId, at: Option<u32>, number: u32, to: &SocketAddr) -> io::Result<u32> {
+        match at {
+            None => Ok(self.plan.short(host, to.is_ipv6())),
             // As with Linux, the address of a group is no source.
-            Some(at) if !to.is_ipv6() && Addresses::is_multicast(at) => Ok(self.plan.short(socket.host, false)),
-            Some(at) => self.check_source(socket.host, at, number, to).map(|()| at),
+            Some(at) if !to.is_ipv6() && Addresses::is_multicast(at) => Ok(self.plan.short(host, false)),
+            Some(at) => self.check_source(host, at, number, to).map(|()| at),
         }
     }
 

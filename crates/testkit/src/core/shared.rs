@@ -290,7 +290,7 @@ impl Shared {
     }
 
     /// Lets time pass until the time of tokio's clock, unless the state is at that time.
-    #[cfg_attr(not(feature = "tokio"), expect(unused_variables, reason = "no other clock moves by itself"))]
+    #[cfg_attr(not(feature = "tokio"), expect(unused_variables, clippy::needless_pass_by_ref_mut, reason = "no other clock moves by itself"))]
     fn follow(&self, core: &mut Core) {
         match self.clock {
             Clock::Own => {}

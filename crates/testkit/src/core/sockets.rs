@@ -181,7 +181,7 @@ impl Core {
         let socket = self.sockets.get(id);
         let to = socket.wire_form(peer)?;
         // The route is asked for its errors: a peer to which no datagram could be sent is refused here, and not at the first send.
-        let route = self.route(socket, &to)?;
+        let route = self.route(socket, socket.at, &to)?;
         // As with Linux, the unspecified address stands for loopback. Datagrams of the peer come from there.
         let ip = if to.ip().is_unspecified() { Addresses::long(route.to, to.is_ipv6()) } else { to.ip() };
         self.sockets.get_mut(id).peer = Some(SocketAddr::new(ip, to.port()));

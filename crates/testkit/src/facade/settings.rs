@@ -50,7 +50,9 @@ impl Configured for TcpStream {
             | Setting::ReuseAddress(_)
             | Setting::ReusePort(_)
             | Setting::OnlyV6(_)
-            | Setting::Broadcast(_) => Ok(()),
+            | Setting::Broadcast(_)
+            | Setting::MulticastTtl(_)
+            | Setting::MulticastLoop(_) => Ok(()),
         }
     }
 }
@@ -78,7 +80,13 @@ impl Configured for TcpListener {
             Setting::ReceiveBuffer(bytes) => config.receive_buffer = Some(bytes as usize),
             Setting::SendBuffer(bytes) => (config.send_buffer, config.least_send_buffer) = (bytes as usize, bytes as usize),
             Setting::Ttl(ttl) => config.ttl = u8::try_from(ttl).unwrap_or(u8::MAX).max(1),
-            Setting::TypeOfService(_) | Setting::ReuseAddress(_) | Setting::ReusePort(_) | Setting::OnlyV6(_) | Setting::Broadcast(_) => {}
+            Setting::TypeOfService(_)
+            | Setting::ReuseAddress(_)
+            | Setting::ReusePort(_)
+            | Setting::OnlyV6(_)
+            | Setting::Broadcast(_)
+            | Setting::MulticastTtl(_)
+            | Setting::MulticastLoop(_) => {}
         })
     }
 }
@@ -89,7 +97,11 @@ impl Configured for UdpSocket {
     }
 
     fn settings(&self) -> io::Result<Vec<Setting>> {
-        Ok(vec![Setting::Ttl(self.ttl()?), Setting::TypeOfService(self.tos_v4()?), Setting::Broadcast(self.broadcast()?)])
+        let multicast = [Setting::MulticastTtl(self.multicast_ttl_v4()?), Setting::MulticastLoop(self.multicast_loop_v4()?)];
+        Ok([Setting::Ttl(self.ttl()?), Setting::TypeOfService(self.tos_v4()?), Setting::Broadcast(self.broadcast()?)]
+            .into_iter()
+            .chain(multicast)
+            .collect())
     }
 
     fn set(&self, setting: Setting) -> io::Result<()> {
@@ -100,6 +112,8 @@ impl Configured for UdpSocket {
             Setting::TypeOfService(value) => self.set_tos_v4(value),
             Setting::Ttl(ttl) => self.set_ttl(ttl),
             Setting::Broadcast(on) => self.set_broadcast(on),
+            Setting::MulticastTtl(ttl) => self.set_multicast_ttl_v4(ttl),
+            Setting::MulticastLoop(on) => self.set_multicast_loop_v4(on),
             Setting::NoDelay(_)
             | Setting::Keepalive(_)
             | Setting::Linger(_)
@@ -140,7 +154,7 @@ impl Configured for TcpSocket {
             Setting::ReuseAddress(on) => self.set_reuseaddr(on),
             Setting::ReusePort(on) => self.set_reuseport(on),
             Setting::OnlyV6(on) => self.set_only_v6(on),
-            Setting::Broadcast(_) => Ok(()),
+            Setting::Broadcast(_) | Setting::MulticastTtl(_) | Setting::MulticastLoop(_) => Ok(()),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Socket for quinn: a virtual UDP socket, with congestion marks in both directions.
 
 use std::io::{self, IoSliceMut};
-use std::net::{IpAddr, SocketAddr};
+use std::net::SocketAddr;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
@@ -19,18 +19,11 @@ use crate::socket::UdpSocket;
 #[derive(Debug)]
 pub(super) struct VirtualSocket {
     socket: UdpSocket,
-    host: Host,
 }
 
 impl VirtualSocket {
     pub(super) fn new(host: &Host, address: impl ToSocketAddrs) -> io::Result<Self> {
-        Ok(Self { socket: host.bind(address)?, host: host.clone() })
-    }
-
-    /// Returns whether the host may send from the address `source`. An address that the host has given up is not valid any more.
-    fn may_send_from(&self, source: Option<IpAddr>) -> bool {
-        // A socket of IPv6 names an address of IPv4 as `::ffff:10.0.0.1`.
-        source.map(|source| source.to_canonical()).is_none_or(|source| source.is_loopback() || self.host.has_address(source))
+        Ok(Self { socket: host.bind(address)? })
     }
 }
 
@@ -40,13 +33,11 @@ impl AsyncUdpSocket for VirtualSocket {
     }
 
     fn try_send(&self, transmit: &Transmit<'_>) -> io::Result<()> {
-        if !self.may_send_from(transmit.src_ip) {
-            return Ok(());
-        }
-        match self.socket.send_now(Some(&transmit.destination), transmit.contents, codepoint(transmit.ecn)) {
+        match self.socket.send_now(Some(&transmit.destination), transmit.src_ip, transmit.contents, codepoint(transmit.ecn)) {
             // The host has crashed, so the endpoint must end.
             Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => Err(error),
-            // As with the sockets of quinn itself, a datagram that cannot be sent is lost, and the protocol notices the loss.
+            // As with the sockets of quinn itself, a datagram that cannot be sent is lost, and the protocol notices the loss. So is a datagram from an address
+            // that the host has given up.
             Ok(_) | Err(_) => Ok(()),
         }
     }

@@ -9,7 +9,6 @@ use cohaptic_units::Ecn;
 
 use super::{KIND, UdpSocket};
 use crate::core::Parcel;
-use crate::errno::Errno;
 
 impl Datagrams for UdpSocket {
     fn poll_receive(&self, cx: &mut Context<'_>, peek: bool, take: &mut dyn FnMut(Received<'_>)) -> Poll<io::Result<()>> {
@@ -31,14 +30,7 @@ impl Datagrams for UdpSocket {
     }
 
     fn send_as(&self, bytes: &[u8], sending: Sending) -> io::Result<usize> {
-        // A socket of IPv6 names an address of IPv4 as `::ffff:10.0.0.1`.
-        if let Some(from) = sending.from.map(|from| from.to_canonical()).filter(|from| !from.is_loopback() && !from.is_unspecified()) {
-            let is_own = self.open(|core| core.plan.of(self.host).has(from))?;
-            if !is_own {
-                return Errno::InvalidInput.fail();
-            }
-        }
-        self.send_now(sending.to.as_ref(), bytes, Ecn::from_bits(sending.ecn))
+        self.send_now(sending.to.as_ref(), sending.from, bytes, Ecn::from_bits(sending.ecn))
     }
 
     fn connect(&self, to: SocketAddr) -> io::Result<()> {

@@ -2,7 +2,7 @@
 
 use std::future::{Future, poll_fn};
 use std::io;
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::task::{Context, Poll};
 
 use cohaptic_units::Ecn;
@@ -30,7 +30,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::send`].
     pub fn try_send(&self, bytes: &[u8]) -> io::Result<usize> {
-        self.send_now(None, bytes, Ecn::NotCapable)
+        self.send_now(None, None, bytes, Ecn::NotCapable)
     }
 
     /// Sends a datagram to an address. Returns the number of bytes sent.
@@ -50,7 +50,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::send_to`].
     pub fn try_send_to(&self, bytes: &[u8], to: SocketAddr) -> io::Result<usize> {
-        self.send_now(Some(&to), bytes, Ecn::NotCapable)
+        self.send_now(Some(&to), None, bytes, Ecn::NotCapable)
     }
 
     /// Sends a datagram to the peer. Always ready.
@@ -74,21 +74,24 @@ impl UdpSocket {
     #[inline]
     fn send_to_now(&self, to: &impl ToSocketAddrs, bytes: &[u8]) -> io::Result<usize> {
         if let Some(to) = to.as_socket_addr() {
-            return self.send_now(Some(to), bytes, Ecn::NotCapable);
+            return self.send_now(Some(to), None, bytes, Ecn::NotCapable);
         }
         // Names mean what they mean to the host of the socket, also where another task sends.
         match current::on_host(Some(self.host), || to.to_socket_addr()) {
-            Ok(to) => self.send_now(Some(&to), bytes, Ecn::NotCapable),
+            Ok(to) => self.send_now(Some(&to), None, bytes, Ecn::NotCapable),
             // A name cannot be looked up outside of the run. The error of a socket that may not be used is more useful than the error of the name.
             Err(error) => self.shared.check_open(self.host, KIND).and(Err(error)),
         }
     }
 
+    /// Sends a datagram, from the address `from` of the host if the program names one.
     #[inline]
-    pub(crate) fn send_now(&self, to: Option<&SocketAddr>, bytes: &[u8], ecn: Ecn) -> io::Result<usize> {
+    pub(crate) fn send_now(&self, to: Option<&SocketAddr>, from: Option<IpAddr>, bytes: &[u8], ecn: Ecn) -> io::Result<usize> {
         // Quinn passes the codepoint of each datagram. All other callers pass none, and the type of service of the socket decides.
         let ecn = if ecn.is_capable() { ecn } else { self.options.ecn() };
-        let outgoing = Outgoing { to, bytes, ecn };
+        // A socket of IPv6 names an address of IPv4 as `::ffff:10.0.0.1`. The unspecified address stands for none.
+        let from = from.map(|from| from.to_canonical()).filter(|from| !from.is_unspecified());
+        let outgoing = Outgoing { to, from, bytes, ecn };
         self.shared.open(self.host, KIND, |core| core.send(self.id, outgoing))??;
         Ok(bytes.len())
     }
