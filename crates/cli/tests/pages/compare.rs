@@ -140,7 +140,7 @@ fn figures_with_an_error_of_rounding_are_the_same_within_it() {
 
 #[test]
 fn only_what_is_said_to_vary_is_passed_over() {
-    let vary = Vary { figures: vec!["a second".to_owned()], lines: vec!["the run is".to_owned()] };
+    let vary = Vary { figures: vec!["a second".to_owned()], lines: vec!["the run is".to_owned()], ..Vary::default() };
     assert!(same(&["radius 1", "in 0.7 s: 90 a second"], &["radius 1", "in 12 ms:  7 a second"], &vary));
     assert!(same(&["the run is valid"], &["the run is not valid: 2 of 3"], &vary));
     assert!(!same(&["radius 1"], &["radius 2"], &vary) && !same(&["in 0.7 s: 90 a second"], &["within 0.7 s: 90 a second"], &vary));

@@ -22,6 +22,7 @@
 //! | `run: TEXT; for: TEXT` | the first in place of the second, for the same reason |
 //! | `needs: PROGRAM`, `needs: LINE` | where that program is not installed, or that line for `sh` fails, the block is not run |
 //! | `exit status: N N …` | of each `cohaptic` of the block in turn |
+//! | `exit status varies` | each is 0 or 1, as that of a test that fails now and then |
 //! | `source: PATH` | the block is that file of the project, or whole lines of it |
 //! | `drawn: FILE` | the picture in the next line is that file, which the commands of the page have written |
 //! | `figures vary` | of what is shown, numbers and units of time are not compared |
@@ -107,6 +108,7 @@ pages! {
     gallery_links: "docs/gallery-links.md",
     how_to_dev_dependency: "docs/how-to-dev-dependency.md",
     how_to_existing_program: "docs/how-to-existing-program.md",
+    #[ignore = ".ci/nightly runs it: real programs run many times in real time"]
     how_to_flaky_test: "docs/how-to-flaky-test.md",
     how_to_keep_a_failure: "docs/how-to-keep-a-failure.md",
     how_to_measure_your_line: "docs/how-to-measure-your-line.md",

@@ -22,6 +22,8 @@ pub(crate) struct Vary {
     pub(crate) figures: Vec<String>,
     /// Texts of lines of which only the text is compared.
     pub(crate) lines: Vec<String>,
+    /// `true` if each exit status may be 0 or 1.
+    pub(crate) statuses: bool,
 }
 
 impl Vary {
@@ -59,6 +61,7 @@ impl Notes {
                 let read: Result<Vec<i32>, _> = list.split_whitespace().map(str::parse).collect();
                 self.statuses = Some(read.map_err(|error| format!("exit status: {error}"))?);
             }
+            ("exit status varies", None) => self.vary.statuses = true,
             ("figures printed above", None) => self.printed = true,
             ("figures vary", None) => self.vary.figures = vec![String::new()],
             ("figures vary", Some(texts)) => self.vary.figures = list(&texts),
@@ -73,10 +76,13 @@ impl Notes {
 #[test]
 fn comments_of_one_line_say_how_a_block_is_run() {
     let mut notes = Notes::default();
-    for comment in ["not run: needs a Falcon", "exit status: 0 1", "figures vary: a second; real time", "run: --runs 3; for: --runs 1000"] {
+    for comment in
+        ["not run: needs a Falcon", "exit status: 0 1", "exit status varies", "figures vary: a second; real time", "run: --runs 3; for: --runs 1000"]
+    {
         assert_eq!(notes.read(comment), Ok(true), "{comment}");
     }
     assert_eq!((notes.not_run.as_deref(), notes.statuses.as_deref()), (Some("needs a Falcon"), Some(&[0, 1][..])));
+    assert!(notes.vary.statuses);
     assert!(notes.vary.figures_of("1493 a second") && !notes.vary.figures_of("radius 0.5"));
     assert_eq!(notes.instead, [("--runs 3".to_owned(), "--runs 1000".to_owned())]);
     notes.read("lines vary: the run is").unwrap();

@@ -9,7 +9,7 @@ use crate::pages::blocks::{Block, Kind, Shown};
 use crate::pages::compare::same;
 use crate::pages::figures;
 use crate::pages::folder::{Folder, Outcome};
-use crate::pages::notes::Notes;
+use crate::pages::notes::{Notes, Vary};
 use crate::pages::pictures::{Drawn, drawn};
 use crate::pages::script::{commands, without_cargo};
 use crate::pages::update::{replaced, shown_anew};
@@ -89,7 +89,7 @@ impl Page<'_> {
                 self.look_up(line, &script);
                 if self.is_run(line, &script, notes) {
                     let outcome = self.folder.run(&with_less_work(&script, notes), notes.run_with.as_deref().unwrap_or_default());
-                    self.statuses(line, &script, &outcome, notes.statuses.as_deref());
+                    self.statuses(line, &script, &outcome, notes.statuses.as_deref(), &notes.vary);
                 }
             }
             Kind::Session(all) => {
@@ -110,7 +110,7 @@ impl Page<'_> {
             let script = with_less_work(&without_cargo(&shown.command), notes);
             let outcome = self.folder.run(&script, notes.run_with.as_deref().unwrap_or_default());
             let own = statuses.map(|statuses| statuses.split_at(outcome.statuses.len().min(statuses.len())));
-            self.statuses(line, &script, &outcome, own.map(|(own, _)| own));
+            self.statuses(line, &script, &outcome, own.map(|(own, _)| own), &notes.vary);
             statuses = own.map(|(_, rest)| rest);
             self.output(shown, &outcome, notes);
             self.printed.push_str(&outcome.printed);
@@ -156,11 +156,12 @@ impl Page<'_> {
     }
 
     /// Each with status 0, unless the page says otherwise.
-    fn statuses(&mut self, line: usize, script: &str, outcome: &Outcome, wanted: Option<&[i32]>) {
+    fn statuses(&mut self, line: usize, script: &str, outcome: &Outcome, wanted: Option<&[i32]>, vary: &Vary) {
         let zeros = vec![0; outcome.statuses.len()];
         let wanted = wanted.unwrap_or(&zeros);
         let last = wanted.last().copied().unwrap_or(0);
-        if outcome.statuses != wanted || ![Some(0), Some(last)].contains(&outcome.status) {
+        let is_wanted = if vary.statuses { outcome.statuses.iter().all(|status| [0, 1].contains(status)) } else { outcome.statuses == wanted };
+        if !is_wanted || ![Some(0), Some(last)].contains(&outcome.status) {
             let what =
                 format!("expected exit status {wanted:?}, got {:?}, of all {:?}:\n{script}\n{}", outcome.statuses, outcome.status, outcome.printed);
             self.problem(line, &what);
