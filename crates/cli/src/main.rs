@@ -44,6 +44,8 @@ mod paper;
 #[cfg(target_os = "linux")]
 mod play;
 mod progress;
+#[cfg(target_os = "linux")]
+mod push;
 mod realtime;
 #[cfg(target_os = "linux")]
 mod relay;

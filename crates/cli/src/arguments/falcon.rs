@@ -28,7 +28,7 @@ pub(crate) enum FalconCommand {
     Simulate(SimulateArguments),
 }
 
-/// Which device, and how it gets its firmware.
+/// Choice of a device, and its firmware.
 #[derive(Debug, Args)]
 pub(crate) struct WhichFalcon {
     /// Use the Falcon with this serial number

@@ -13,12 +13,13 @@ use super::answer::{self, Forces, Identity, Seen, Traffic, buttons};
 use super::bench::{Bench, End, Go, Task};
 use super::home::Guide;
 use super::reach;
-use crate::arguments::{Force, WatchArguments};
+use crate::arguments::WatchArguments;
 use crate::device_text::{SamplesFile, print_row, ruler};
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::output;
 use crate::progress::Progress;
+use crate::push::Push;
 
 /// Time between two rows on standard output, or between two updates of the line on a terminal.
 const READABLE: Duration = Duration::from_millis(100);
@@ -45,7 +46,7 @@ struct WatchDocument {
 /// Watches a device until the time limit passes or the user interrupts the command, and writes the answer.
 pub(super) fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
     let which = &arguments.which;
-    let push = Push::of(arguments)?;
+    let push = Push::of(arguments.force, arguments.spring, arguments.damping, arguments.limit)?;
     let firmware = reach::read_firmware(which.firmware.as_deref())?;
     let target = reach::target(which)?;
     let mut way = target.open().map_err(|error| Failure::System(error.to_string()))?;
@@ -99,47 +100,6 @@ impl WatchDocument {
         lines.extend(answer::seen(&self.seen));
         lines.push(answer::forces(&self.forces));
         answer::block(name, &lines)
-    }
-}
-
-/// Force on the grip: none, a constant force \[N\], or a spring to the origin (stiffness \[N/m\], damping \[N·s/m\]).
-#[derive(Clone, Copy, PartialEq, Debug)]
-enum Push {
-    Nothing,
-    Force(Triple),
-    Spring { stiffness: f64, damping: f64 },
-}
-
-impl Push {
-    fn of(arguments: &WatchArguments) -> Result<Self, Failure> {
-        match (arguments.force, arguments.spring) {
-            (Some(Force(force)), _) => {
-                let length = answer::length(force);
-                // The driver would reduce such a force without an error, and the user would not get the force of the option.
-                if length > arguments.limit {
-                    return Err(Failure::Input(format!(
-                        "the force of {length:.3} N is above the limit of {} N: ask for less, or raise --limit (docs/falcon.md says what is uncertain about newtons)",
-                        arguments.limit
-                    )));
-                }
-                Ok(Self::Force(force))
-            }
-            (None, Some(stiffness)) => Ok(Self::Spring { stiffness, damping: arguments.damping }),
-            (None, None) => Ok(Self::Nothing),
-        }
-    }
-
-    /// Returns the force for the grip's present reading \[N\]; `None` asks for no force.
-    fn wants(&self, status: &Status) -> Option<Triple> {
-        match *self {
-            Self::Nothing => None,
-            Self::Force(force) => Some(force),
-            Self::Spring { stiffness, damping } => {
-                // Without a reading the position is unknown, so that the spring asks for no force.
-                let reading = status.reading?;
-                Some(std::array::from_fn(|axis| -stiffness * reading.position[axis] - damping * reading.velocity[axis]))
-            }
-        }
     }
 }
 
@@ -210,7 +170,7 @@ impl Watching {
 
 impl Task for Watching {
     fn wants(&mut self, _at: Duration, status: &Status) -> Option<Triple> {
-        self.push.wants(status)
+        self.push.wants(status.reading.map(|reading| (reading.position, reading.velocity)))
     }
 
     fn look(&mut self, at: Duration, status: &Status) -> Result<Go, Failure> {

@@ -10,12 +10,13 @@ use serde::Serialize;
 
 use super::answer::{self, Exchanges, Identity, Seen};
 use super::bench::{self, End, PERIOD, Task};
-use crate::arguments::{Force, Inverse3WatchArguments};
+use crate::arguments::Inverse3WatchArguments;
 use crate::device_text::{SamplesFile, Triple, block, length, place, print_row, ruler};
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INPUT_OUTPUT, INTERRUPTED};
 use crate::output;
 use crate::progress::Progress;
+use crate::push::Push;
 use crate::realtime::say;
 
 /// Time between two rows on standard output, or between two updates of the lines on a terminal.
@@ -39,7 +40,7 @@ struct WatchDocument {
 
 /// Watches a device until the time limit passes or the user interrupts the command, and writes the answer.
 pub(super) fn watch(arguments: &Inverse3WatchArguments) -> Result<ExitCode, Failure> {
-    let push = Push::of(arguments)?;
+    let push = Push::of(arguments.force, arguments.spring, arguments.damping, arguments.limit)?;
     let mut watching = Watching::new(push, arguments)?;
     let ran = bench::run(&arguments.which, arguments.limit, arguments.length, &mut watching);
     // The lines are cleared before any failure is printed, and the rows written up to a failure are kept.
@@ -82,31 +83,6 @@ impl WatchDocument {
         }
         lines.extend(self.exchanges.lines());
         block(&self.identity.name(), &lines)
-    }
-}
-
-/// Force on the hand: none, a constant force \[N\], or a spring to the origin (stiffness \[N/m\], damping \[N·s/m\]).
-#[derive(Clone, Copy, PartialEq, Debug)]
-enum Push {
-    Nothing,
-    Force(Triple),
-    Spring { stiffness: f64, damping: f64 },
-}
-
-impl Push {
-    fn of(arguments: &Inverse3WatchArguments) -> Result<Self, Failure> {
-        match (arguments.force, arguments.spring) {
-            (Some(Force(force)), _) => {
-                let (asked, limit) = (length(force), arguments.limit);
-                // The gate would shorten such a force without an error, and the user would not get the force of the option.
-                if asked > limit {
-                    return Err(Failure::Input(format!("the force of {asked:.3} N is above the limit of {limit} N: ask for less, or raise --limit")));
-                }
-                Ok(Self::Force(force))
-            }
-            (None, Some(stiffness)) => Ok(Self::Spring { stiffness, damping: arguments.damping }),
-            (None, None) => Ok(Self::Nothing),
-        }
     }
 }
 
@@ -173,15 +149,7 @@ impl Watching {
 
 impl Task for Watching {
     fn wants(&self, snapshot: &Snapshot) -> Option<Triple> {
-        match self.push {
-            Push::Nothing => None,
-            Push::Force(force) => Some(force),
-            Push::Spring { stiffness, damping } => {
-                // Without a reading the position is unknown, so that the spring asks for no force.
-                let reading = snapshot.for_peer()?;
-                Some(std::array::from_fn(|axis| -stiffness * reading.position[axis] - damping * reading.velocity[axis]))
-            }
-        }
+        self.push.wants(snapshot.for_peer().map(|reading| (reading.position, reading.velocity)))
     }
 
     fn look(&mut self, at: Duration, snapshot: &Snapshot) -> Result<(), Failure> {

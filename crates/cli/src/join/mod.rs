@@ -61,7 +61,7 @@ pub(crate) fn join(arguments: &JoinArguments) -> Result<ExitCode, Failure> {
     let devices = facts.reports(&scene);
     report.validity = exchanges::judge(report.validity, &devices);
     if !joined.was_heard(&report.status) && !interrupt::requested() {
-        return Err(Failure::System(joined.reasons()));
+        return Err(Failure::System(joined.reasons(&report.status)));
     }
     output::text(&report::describe(&joined, &report, &devices))?;
     output::wrote(&report.files);
@@ -184,7 +184,7 @@ impl Told {
         let name = &joined.scene.peers[joined.place].name;
         let was_heard = joined.was_heard(status);
         if !was_heard && waited >= NO_WELCOME && !std::mem::replace(&mut self.reasons, true) {
-            say(&joined.reasons());
+            say(&joined.reasons(status));
         }
         if was_heard && !std::mem::replace(&mut self.welcomed, true) {
             say(&format!("the session at {} takes part with {name}", joined.session));

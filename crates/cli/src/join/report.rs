@@ -9,8 +9,8 @@ use cohaptic_units::print::{Counted, Span};
 
 use crate::arguments::JoinDevice;
 use crate::live::answer::without_force;
-use crate::live::exchanges::DeviceReport;
-use crate::realtime::{late, notes};
+use crate::live::exchanges::{DeviceReport, notes};
+use crate::realtime::late;
 use crate::run::answer::length;
 
 /// Peer at this computer, and its session.
@@ -45,9 +45,17 @@ impl Joined<'_> {
     }
 
     /// Returns the sentence about a session that does not answer.
-    pub(super) fn reasons(&self) -> String {
+    pub(super) fn reasons(&self, status: &JoinedStatus) -> String {
         let Self { scene, place, session, identity, .. } = self;
         let (name, seed) = (&scene.peers[*place].name, scene.seed);
+        // Without a key a session answers samples alone, and a peer whose device is not ready sends no sample: the session is not to blame.
+        if !self.is_keyed && !status.is_device_there {
+            let device = self.device.kind();
+            return format!(
+                "nothing is sent to {session} yet: the {device} of {name} is not there, or not ready. cohaptic {device} probe says why; \
+                 --device simulated joins without one"
+            );
+        }
         let everywhere = format!("no session listens there, or a firewall on the way drops UDP; its number, the seed of its scene, is not {seed}");
         let seat = format!("its peer at place {place} is not of kind \"udp\", or has another computer ({name} here)");
         if self.is_keyed {

@@ -12,10 +12,10 @@ use cohaptic_scene::Scene;
 use cohaptic_units::print::{Counted, Span};
 use serde::Serialize;
 
-use super::exchanges::DeviceReport;
+use super::exchanges::{DeviceReport, notes};
 use crate::document_schema::{document, lateness, micros};
 use crate::output;
-use crate::realtime::{late, notes};
+use crate::realtime::late;
 use crate::run::answer::{diverged, length, packets};
 
 /// Returns the answer of `cohaptic live --json`.

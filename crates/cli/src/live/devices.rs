@@ -141,7 +141,7 @@ mod inverse3s {
         }
         for (peer, _) in inverse3s.readiness().filter(|(_, readiness)| !readiness.is_simulated) {
             let peer = &scene.peers[peer].name;
-            say(&format!("the Inverse3 of {peer}: hold the cursor at the origin for a moment; {peer} joins then"));
+            say(&format!("the Inverse3 of {peer}: start Haply's Inverse Service, and hold the cursor at the origin for a moment; {peer} joins then"));
         }
         Ok(Some(inverse3s))
     }

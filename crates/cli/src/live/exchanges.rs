@@ -2,11 +2,15 @@
 
 use std::time::Duration;
 
-use cohaptic_realtime::Validity;
+use cohaptic_realtime::{Prepared, Validity};
 use cohaptic_scene::Scene;
 
 #[cfg(feature = "inverse3")]
 use crate::inverse3::Exchanges;
+use crate::realtime;
+
+/// Name of late events in the verdict.
+const EXCHANGES: &str = "exchanges with a device";
 
 /// Handles to facts about the devices of a session. The facts are whole once the session has dropped the devices.
 #[derive(Debug, Default)]
@@ -64,9 +68,18 @@ impl DeviceFacts {
 pub(crate) fn judge(validity: Validity, reports: &[DeviceReport]) -> Validity {
     let is_late = |report: &&DeviceReport| report.late > 1 && report.late > report.readings / 1000;
     match reports.iter().find(is_late).filter(|_| validity.is_valid()) {
-        Some(report) => Validity::NotValid { late: report.late, of: report.readings, what: "exchanges with a device", limit: Duration::ZERO },
+        Some(report) => Validity::NotValid { late: report.late, of: report.readings, what: EXCHANGES, limit: Duration::ZERO },
         None => validity,
     }
+}
+
+/// Returns the notes below the report of a run with devices. `--tolerance` does not count for exchanges: the scene says how long a reply may take.
+pub(crate) fn notes(prepared: &Prepared, validity: Validity) -> String {
+    if !matches!(validity, Validity::NotValid { what: EXCHANGES, .. }) {
+        return realtime::notes(prepared, validity);
+    }
+    let advice = "  what to do: give the device the exchange-every (device.exchange-every) that 99 of 100 replies fit in, or end other programs\n";
+    realtime::notes(prepared, Validity::Valid) + advice
 }
 
 /// Exchanges of a program that drives no device with exchanges: there is no value.
@@ -78,5 +91,32 @@ pub(crate) enum Exchanges {}
 impl Exchanges {
     pub(crate) fn lines(&self) -> Vec<String> {
         match *self {}
+    }
+}
+
+#[cfg(all(test, feature = "inverse3"))]
+mod tests {
+    use cohaptic_inverse3::client::Report;
+
+    use super::*;
+
+    fn judged(late: u64, readings: u64) -> Validity {
+        let exchanges = Exchanges::of(&Report::default(), Duration::from_millis(1));
+        judge(Validity::Valid, &[DeviceReport { peer: 0, exchanges, late, readings, error: None }])
+    }
+
+    #[test]
+    fn more_than_one_late_exchange_in_a_thousand_is_not_valid_and_the_advice_is_a_key_of_the_scene() {
+        assert_eq!([judged(1, 10), judged(2, 2000)], [Validity::Valid; 2]);
+        let late = judged(3, 2000);
+        assert_eq!(late.to_string(), "not valid: 3 of 2000 exchanges with a device were late, and at most one in a thousand may be");
+        let prepared = Prepared::default();
+        let advice = notes(&prepared, late);
+        assert!(advice.contains("device.exchange-every") && !advice.contains("--tolerance"), "{advice}");
+        let ticks = Validity::NotValid { late: 3, of: 9, what: "ticks", limit: Duration::from_millis(1) };
+        assert!(notes(&prepared, ticks).contains("--tolerance") && notes(&prepared, Validity::Valid).is_empty());
+        // Late ticks come first: a machine that is too busy makes replies late, too.
+        let exchanges = Exchanges::of(&Report::default(), Duration::from_millis(1));
+        assert_eq!(judge(ticks, &[DeviceReport { peer: 0, exchanges, late: 9, readings: 9, error: None }]), ticks);
     }
 }

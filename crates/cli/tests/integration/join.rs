@@ -149,10 +149,22 @@ fn an_inverse3_joins_and_the_report_tells_its_exchanges() {
     }
 }
 
+#[cfg(feature = "inverse3")]
+#[test]
+fn without_a_key_a_device_that_is_not_there_is_the_reason() {
+    let desk = desk();
+    // Nobody listens at port 1, so that the service of the device is not there. The session is not asked, because nothing is sent without the device.
+    desk.write("lab.toml", LAB.replace(r#"falcon = { device = "simulated" }"#, r#"inverse3 = { service = "ws://127.0.0.1:1/" }"#));
+    let outcome = desk.cohaptic(&format!("join 127.0.0.1:7400 lab.toml --peer left --device inverse3 --for 300ms {UNHURRIED}"));
+    outcome.assert_refused(3, &["nothing is sent to 127.0.0.1:7400 yet: the inverse3 of left is not there", "cohaptic inverse3 probe says why"]);
+    assert!(!outcome.stderr.contains("Possible reasons"), "{}", outcome.stderr);
+}
+
 #[test]
 fn a_wrong_key_scene_place_or_kind_is_a_sentence() {
     let desk = desk();
-    let (session, address) = session(&desk, "");
+    // The length of the session is no part of the scene that both computers must have.
+    let (session, address) = session(&desk, "--for 50min");
     desk.text("live --new-key other.key");
     let join = |words: &str| desk.cohaptic(&format!("join {address} lab.toml --device simulated {UNHURRIED} {words}"));
     let left = "--peer left --key-file session.key";
@@ -165,7 +177,7 @@ fn a_wrong_key_scene_place_or_kind_is_a_sentence() {
     join(&format!("{left} --for 300ms --set link.delay=25ms")).assert_refused(3, no_welcome);
     let other = session.said("127.0.0.1:");
     assert!(other.contains(" asked to be left with another scene: ") && other.contains(", and this session's is "), "{other}");
-    // The length of this peer's part is its own.
+    // The length of this peer's part is its own, too.
     let joined = join(&format!("{left} --for 300ms"));
     assert_eq!(joined.status, Some(0), "{}", joined.stderr);
     // A session with a key does not answer a `join` without a key, and the key is among the possible reasons.

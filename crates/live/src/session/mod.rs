@@ -106,8 +106,8 @@ const LOOK: Duration = Duration::from_millis(20);
 const SHOW_EVERY: u32 = 3;
 
 impl Session {
-    /// Binds the socket, creates the files of the record, and makes the scene. `devices` returns the device of a peer of kind `falcon` or `pointer`, given the
-    /// index of the peer. A peer for which `devices` returns `None` counts as absent throughout.
+    /// Binds the socket, creates the files of the record, and makes the scene. `devices` returns the device of a peer of kind `falcon`, `inverse3` or
+    /// `pointer`, given the index of the peer. A peer for which `devices` returns `None` counts as absent throughout.
     ///
     /// # Errors
     ///

@@ -150,8 +150,8 @@ fn a_joined_peer_moves_as_the_peer_of_the_session_over_the_same_link() {
     }
 }
 
-/// Device at a fixed position that can be there or not.
-struct There(std::sync::Arc<std::sync::Mutex<(bool, f64)>>);
+/// Device at a fixed position that can be there or not, the force on its hand, and its stopper.
+struct There(std::sync::Arc<std::sync::Mutex<(bool, f64)>>, Stopper);
 
 impl Device for There {
     fn description(&self) -> Description {
@@ -159,7 +159,7 @@ impl Device for There {
     }
 
     fn stopper(&self) -> Stopper {
-        Stopper::default()
+        self.1.clone()
     }
 
     fn read(&mut self, _now: Instant) -> Option<Reading> {
@@ -175,7 +175,7 @@ impl Device for There {
 fn a_silent_session_and_a_device_that_is_not_there_end_the_force_at_once() {
     let shared = std::sync::Arc::new(std::sync::Mutex::new((true, 0.0)));
     let quick = ["peers.left.kind=falcon", "peers.left.silence.fade=100ms"];
-    let mut peer = peer(&quick, None, Some(Box::new(There(shared.clone()))));
+    let mut peer = peer(&quick, None, Some(Box::new(There(shared.clone(), Stopper::default()))));
     let mut seconds = |until: u64, there: bool| {
         shared.lock().unwrap().0 = there;
         let sent = pass(&mut peer, at(until * 1000), &mut |_| ()).len();
@@ -201,6 +201,27 @@ fn a_silent_session_and_a_device_that_is_not_there_end_the_force_at_once() {
     pass(&mut peer, at(2_050_000), &mut |_| ());
     assert!(status(&peer, 2050) && shared.lock().unwrap().1.abs() > 1e-3, "the session is back, and the force rises");
     assert_eq!(peer.status(at(2_050_000)).silences, 1);
+}
+
+#[test]
+fn a_stop_and_a_panic_end_the_force_for_good() {
+    let begun = || {
+        let (shared, stopper) = (std::sync::Arc::new(std::sync::Mutex::new((true, 0.0))), Stopper::default());
+        let device = There(shared.clone(), stopper.clone());
+        let mut peer = peer(&["peers.left.kind=falcon", "peers.left.silence.fade=100ms"], None, Some(Box::new(device)));
+        pass(&mut peer, at(500_000), &mut |_| ());
+        assert!(shared.lock().unwrap().1.abs() > 0.1 && !stopper.is_stopped());
+        (peer, shared, stopper)
+    };
+    let (mut stopped, shared, stopper) = begun();
+    stopped.stop();
+    assert_eq!((shared.lock().unwrap().1, stopper.is_stopped()), (0.0, true));
+    pass(&mut stopped, at(600_000), &mut |_| ());
+    assert_eq!(shared.lock().unwrap().1, 0.0);
+    // A thread of a driver sees the stopper; the joined peer is dropped on the way.
+    let (mut panics, _, stopper) = begun();
+    let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(move || pass(&mut panics, at(600_000), &mut |_| panic!("in a tick"))));
+    assert!(panicked.is_err() && stopper.is_stopped());
 }
 
 /// The other peer is elsewhere, too: before its first sample and after its silence it has no pull, and its pull rises and falls over its fade.

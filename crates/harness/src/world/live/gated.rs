@@ -116,3 +116,78 @@ impl Drop for GatedDevice {
         self.device.stop();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{Arc, Mutex};
+
+    use cohaptic_device::{Description, Stopper};
+
+    use super::*;
+
+    /// Device with a description of this force, and the latest force on the hand.
+    struct Noted(f64, Arc<Mutex<[f64; 3]>>);
+
+    impl Device for Noted {
+        fn description(&self) -> Description {
+            Description { name: "noted".to_owned(), motions: 3, force: self.0, period: Duration::from_millis(1) }
+        }
+
+        fn stopper(&self) -> Stopper {
+            Stopper::default()
+        }
+
+        fn read(&mut self, _now: Instant) -> Option<Reading> {
+            Some(Reading::default())
+        }
+
+        fn hold(&mut self, _now: Instant, _span: Duration, force: GatedForce) {
+            *self.1.lock().unwrap() = force.newtons();
+        }
+    }
+
+    /// Returns the forces along x \[N\] at these milliseconds, of a device that is read every `tick` milliseconds and asked for 30 N.
+    fn forces(description: f64, tick: u64, at: &[u64]) -> Vec<f64> {
+        let held = Arc::default();
+        let mut device = GatedDevice::new(Box::new(Noted(description, Arc::clone(&held))), Duration::from_millis(tick));
+        let force = |millis: &u64| {
+            let now = Instant::ZERO + Duration::from_millis(*millis);
+            device.read(now, now, Some);
+            device.hold(now, Duration::from_millis(tick), [30.0, 0.0, 0.0]);
+            held.lock().unwrap()[0]
+        };
+        at.iter().map(force).collect()
+    }
+
+    #[test]
+    fn the_description_limits_the_force_and_counts_as_zero_out_of_range() {
+        assert_eq!(forces(2.5, 1, &[0, 1, 2, 3, 4]), [0.0, 1.0, 2.0, 2.5, 2.5]);
+        for description in [-1.0, 20.1, f64::NAN, f64::INFINITY] {
+            assert_eq!(forces(description, 1, &[0, 1, 2]), [0.0; 3], "{description}");
+        }
+    }
+
+    #[test]
+    fn a_slow_tick_is_no_pause_and_two_ticks_are_the_longest() {
+        assert_eq!(forces(20.0, 50, &[0, 50, 150, 251, 301]), [0.0, 20.0, 20.0, 0.0, 20.0]);
+        assert_eq!(forces(20.0, 1, &[0, 20, 41, 42]), [0.0, 20.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn a_hand_that_is_let_go_has_no_force_at_once_and_then_the_force_grows() {
+        let held = Arc::default();
+        let mut device = GatedDevice::new(Box::new(Noted(20.0, Arc::clone(&held))), Duration::from_millis(1));
+        let mut force = |millis: u64, is_held: bool| {
+            let (now, span) = (Instant::ZERO + Duration::from_millis(millis), Duration::from_millis(1));
+            device.read(now, now, Some);
+            if is_held {
+                device.hold(now, span, [30.0, 0.0, 0.0])
+            } else {
+                device.let_go(now, span)
+            }
+            held.lock().unwrap()[0]
+        };
+        let forces: Vec<f64> = [(0, true), (10, true), (11, false), (12, true)].map(|(millis, is_held)| force(millis, is_held)).into();
+        assert_eq!(forces, [0.0, 10.0, 0.0, 1.0]);
+    }
+}
