@@ -33,6 +33,12 @@ pub fn words(measured: &Measured) -> String {
     if measured.figures.iter().any(|figure| figure.outside) {
         line("  * more than 4 standard errors from what was asked".to_owned());
     }
+    if measured.achieved.delay.as_ref().is_some_and(|delay| delay.mean_se_s.is_none()) && measured.sent >= LEAST_JUDGED {
+        line("  no standard error: the delays change more slowly than a stream of this length can tell; longer: --every 8ms, or more --packets".to_owned());
+    }
+    if !fills_the_rate(measured) {
+        line("  the stream does not fill the rate: larger packets (--size) or less time between packets (--every) do".to_owned());
+    }
     if measured.sent > MOST_MEASURED {
         line(format!("  figures describe the first {MOST_MEASURED} packets, counts all packets"));
     }
@@ -53,6 +59,17 @@ fn row(figure: &Figure) -> String {
     let mark = if figure.outside { "  *" } else { "" };
     let [asked, achieved, error] = [Some(figure.asked), figure.achieved, figure.standard_error].map(|value| shown(name, value));
     format!("  {:<24}{asked:>18}{achieved:>18}{error:>14}{mark}", label(name))
+}
+
+/// Fewest packets for which a missing standard error has another reason than their number.
+const LEAST_JUDGED: u64 = 1000;
+
+/// Returns `false` if the achieved rate is that of the stream and not that of the link: the link has a rate, less than nine tenths of the rate arrived, no
+/// cross-traffic had a share, and no queue dropped a packet.
+fn fills_the_rate(measured: &Measured) -> bool {
+    let (Some(asked), Some(achieved)) = (measured.asked.rate_bit_s, measured.achieved.throughput_bit_s) else { return true };
+    let by_queues = measured.achieved.fates.dropped.iter().any(|(cause, count)| !["loss", "outage"].contains(cause) && *count > 0);
+    achieved >= 0.9 * asked || measured.cross_traffic.offered > 0 || by_queues
 }
 
 /// A figure: name, requested value, achieved value, and standard error of the achieved value.

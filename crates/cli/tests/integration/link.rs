@@ -155,6 +155,20 @@ fn the_text_sets_asked_beside_achieved() {
     assert!(!text.contains("per second"), "{text}");
 }
 
+/// A missing standard error and a rate that the stream does not fill are explained where they occur.
+#[test]
+fn the_text_says_why_a_figure_tells_little() {
+    let desk = Desk::new();
+    let notes = |line: &str| {
+        let text = desk.text(line);
+        ["no standard error:", "does not fill the rate:"].map(|note| text.contains(note))
+    };
+    assert_eq!(notes("link starlink/down --packets 20000"), [true, true]);
+    assert_eq!(notes("link starlink/down --packets 90000 --every 8ms"), [false, true]);
+    assert_eq!(notes("link delay 20ms 2ms loss 1% --packets 2000"), [false; 2]);
+    assert_eq!(notes("link delay=20ms rate=10Mbit --packets 2000 --size 1250B --every 1ms"), [false; 2]);
+}
+
 #[test]
 fn what_cannot_be_read_is_shown_with_the_word() {
     let desk = Desk::with("log.csv", "not a log\n");
