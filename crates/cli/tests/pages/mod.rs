@@ -145,6 +145,7 @@ pages! {
     stability_crate: "crates/stability/README.md",
     tcp_crate: "crates/tcp/README.md",
     tasks: "docs/tasks.md",
+    tested_with: "docs/tested-with.md",
     testing: "docs/testing.md",
     testkit_crate: "crates/testkit/README.md",
     tutorial_existing_program: "docs/tutorial-existing-program.md",

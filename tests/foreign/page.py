@@ -1,0 +1,48 @@
+"""Writes the rows of a suite into the tables of docs/tested-with.md. Rows of other suites stay."""
+
+import re
+
+from suites import LOOPBACKS, SUITES
+
+LINKS = " | ".join(f"`{words}`" for words in LOOPBACKS)
+PASSING = f"| crate | tests | over the network | real loopback | {LINKS} | lines changed |\n| --- | ---: | ---: | ---: |{' ---: |' * len(LOOPBACKS)} ---: |"
+TIMES = f"| crate | real loopback | {LINKS} |\n| --- | ---: |{' ---: |' * len(LOOPBACKS)}"
+UNDER_LOAD = "| crate | runs | real loopback: a test fails | test bed: other tests fail than without load |\n| --- | ---: | ---: | ---: |"
+FAILURES = "| crate | test | loopback | seeds that fail | smallest loopback, with the seed |\n| --- | --- | --- | ---: | --- |"
+LIMITS = "| crate | test | why |\n| --- | --- | --- |"
+
+
+def tables(suite, figures):
+    """Returns the head of each table, and the rows of the suite."""
+    name, tests, loads = suite.name, figures["tests"], figures["loads"]
+    passing = [tests - failed for failed in figures["failed"]]
+    under_load = [sum(map(bool, figures[which])) for which in ("real under load", "beds under load")]
+    return {
+        PASSING: [row(f"{name} {suite.version} ({suite.licence})", tests, figures["networked"], *passing, figures["changed"])],
+        TIMES: [row(name, *(f"{taken:.2f}" for taken in figures["seconds"]))],
+        UNDER_LOAD: [row(name, loads, *under_load)],
+        FAILURES: [
+            row(name, f"`{test}`", f"`{words}`", f"{len(seeds)} of {figures['seeds']}", f"`{smallest}`, seed {seeds[0]}")
+            for test, words, seeds, smallest in figures["failures"]
+        ],
+        LIMITS: [row(name, f"`{test}`", suite.limits.get(test, "")) for test in sorted(figures["limits"])],
+    }
+
+
+def row(*cells):
+    return f"| {' | '.join(map(str, cells))} |"
+
+
+def place(line):
+    """Returns the place of a row in the order of the suites."""
+    return [suite.name for suite in SUITES].index(re.match(r"\| ([\w-]+)", line)[1])
+
+
+def write(path, suite, figures):
+    text = path.read_text()
+    for head, rows in tables(suite, figures).items():
+        before, after = text.split(f"{head}\n", 1)
+        table = re.match(r"(?:\|.*\n)*", after)[0]
+        others = [line for line in table.splitlines() if place(line) != SUITES.index(suite)]
+        text = "\n".join([before + head, *sorted(others + rows, key=place), after[len(table) :]])
+    path.write_text(text)

@@ -1,0 +1,150 @@
+"""Runs of a suite, each kept in a file as soon as it is over."""
+
+import contextlib
+import json
+import multiprocessing
+import os
+import re
+import subprocess
+import time
+
+from suites import CUT, IDEAL, LOOPBACKS
+
+# Runs on the real loopback without load, and programs that only compute beside the runs with load.
+REAL, BURNERS = 3, 4
+# Longest time of a program of tests [s].
+PATIENCE = 300
+
+
+def called(command, folder, patience=None, **variables):
+    """Calls a program. A program that takes longer than `patience` [s] is ended, and has no status."""
+    environment = {**os.environ, **variables}
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        return subprocess.run(command, cwd=folder, env=environment, timeout=patience, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace")
+    return subprocess.CompletedProcess(command, None, "", "")
+
+
+class Runs:
+    """`programs` are the programs of a suite for both builds, by the names of the targets."""
+
+    def __init__(self, suite, folder, programs, work):
+        self.suite, self.folder, self.programs = suite, folder, programs
+        self.file, self.log = (work / f"{suite.name}-{suite.version}{end}" for end in (".json", ".log"))
+        self.kept = json.loads(self.file.read_text()) if self.file.exists() else {"runs": {}, "smallest": {}}
+        tests = {target: self.names(program) - self.names(program, "--ignored") for target, program in programs["real"].items()}
+        self.tests = {target: names for target, names in tests.items() if names}
+
+    def names(self, program, *arguments):
+        return set(re.findall(r"^(\S+): test$", called([program, "--list", *arguments], self.folder).stdout, re.M))
+
+    def keep(self, kind, key, value):
+        self.kept[kind][key] = value
+        partial = self.file.with_suffix(".partial")
+        partial.write_text(json.dumps(self.kept, indent=1, sort_keys=True))
+        partial.rename(self.file)
+        return value
+
+    def run(self, key, build, **variables):
+        """Returns the failed tests of a run, and its time [s]. A run that was kept is not repeated."""
+        if key in self.kept["runs"]:
+            return self.kept["runs"][key]
+        wrong, begin = [], time.monotonic()
+        for target, tests in self.tests.items():
+            # Programs of tests that log would print between the names of tests and their results.
+            done = called([self.programs[build][target]], self.folder, PATIENCE, RUST_LOG="off", **variables)
+            names = sorted(failed(done, tests))
+            wrong += [f"{target} {test}" for test in names]
+            if names:
+                with self.log.open("a") as log:
+                    log.write(f"##### {key}: {target}\n{done.stdout}{done.stderr}\n")
+        return self.keep("runs", key, [wrong, time.monotonic() - begin])
+
+    def real(self, number, prefix=""):
+        return self.run(f"{prefix}real {number}", "real")
+
+    def bed(self, words, seed, prefix=""):
+        return self.run(f"{prefix}{words} seed {seed}", "bed", **self.variables(words, seed))
+
+    def variables(self, words, seed):
+        asked = {"COHAPTIC_TEST_LOOPBACK": words, "COHAPTIC_TEST_SEED": str(seed), "COHAPTIC_TEST_STD": "clocks random"}
+        return {**asked, **self.suite.variables}
+
+    def fails(self, test, words, seed):
+        target, name = test.rsplit(" ", 1)
+        return called([self.programs["bed"][target], "--exact", name], self.folder, PATIENCE, **self.variables(words, seed)).returncode != 0
+
+    def smallest(self, test, words, seed):
+        """Returns the words that are left if each part is left out without which the test still fails. Of a delay alone, the least whole number of
+        milliseconds is sought."""
+        key = f"{test}: {words} seed {seed}"
+        if key in self.kept["smallest"]:
+            return self.kept["smallest"][key]
+        parts = re.findall(r"(?:delay|loss|rate)(?: [0-9]\S*)+", words)
+        for part in list(parts):
+            rest = [other for other in parts if other != part]
+            if rest and self.fails(test, " ".join(rest), seed):
+                parts = rest
+        delay = re.match(r"delay (\d+)ms", parts[0]) if len(parts) == 1 else None
+        if delay and self.fails(test, delay[0], seed):
+            low, high = 0, int(delay[1])
+            while high - low > 1:
+                middle = (low + high) // 2
+                low, high = (low, middle) if self.fails(test, f"delay {middle}ms", seed) else (middle, high)
+            parts = [f"delay {high}ms"]
+        return self.keep("smallest", key, " ".join(parts))
+
+    def figures(self, seeds, loads):
+        """Makes all runs that are not kept, and returns what the page shows."""
+        real = [self.real(number) for number in range(REAL)]
+        beds = {words: [self.bed(words, seed) for seed in range(seeds)] for words in LOOPBACKS}
+        loads = min(loads, self.suite.loads)
+        # Loopbacks take turns, and then seeds.
+        turns = [(LOOPBACKS[number % len(LOOPBACKS)], number // len(LOOPBACKS) % seeds) for number in range(loads)]
+        with load():
+            real_under = [self.real(number, "load: ")[0] for number in range(loads)]
+            bed_under = [self.bed(*turn, f"load {number}: ")[0] for number, turn in enumerate(turns)]
+        failures = {}
+        for words, runs in beds.items():
+            for seed, (wrong, _) in enumerate(runs):
+                for test in wrong:
+                    failures.setdefault((test, words), []).append(seed)
+        limits = {test for test, words in failures if words == IDEAL}
+        own = sorted(item for item in failures.items() if item[0][0] not in limits)
+        return {
+            "tests": sum(map(len, self.tests.values())),
+            "networked": len(set(self.bed(CUT, 0)[0]) - limits),
+            "seeds": seeds,
+            "failed": [len({test for wrong, _ in real for test in wrong}), *(len({test for test, where in failures if where == words}) for words in LOOPBACKS)],
+            "seconds": [sum(taken for _, taken in runs) / len(runs) for runs in [real, *beds.values()]],
+            "limits": limits,
+            "failures": [(test, words, found, self.smallest(test, words, found[0])) for (test, words), found in own],
+            "loads": loads,
+            "real under load": [sorted(set(wrong) - set(real[0][0])) for wrong in real_under],
+            "beds under load": [wrong != self.bed(*turn)[0] for wrong, turn in zip(bed_under, turns)],
+        }
+
+
+def failed(done, tests):
+    """Returns those of the tests that have failed, or have not ended."""
+    # The list at the end is whole, also if output of a test has come between the name of a test and the result.
+    if re.search(r"^test result: ", done.stdout, re.M):
+        return tests & set(re.findall(r"^    (\S+)$", done.stdout.rpartition("\nfailures:\n")[2], re.M)) if done.returncode else set()
+    return tests - set(re.findall(r"^test (\S+)(?: - should panic)? \.\.\. ok$", done.stdout, re.M))
+
+
+def compute():
+    while True:
+        pass
+
+
+@contextlib.contextmanager
+def load():
+    """Other programs that compute meanwhile."""
+    burners = [multiprocessing.Process(target=compute, daemon=True) for _ in range(BURNERS)]
+    for burner in burners:
+        burner.start()
+    try:
+        yield
+    finally:
+        for burner in burners:
+            burner.terminate()

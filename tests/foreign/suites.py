@@ -1,0 +1,36 @@
+"""The suites, the loopbacks, and the tests that cannot run on a test bed."""
+
+from dataclasses import dataclass, field
+
+IDEAL = "delay 0ms"
+# Tests that pass without any packet do not need the network.
+CUT = "loss 100%"
+LOOPBACKS = [IDEAL, "delay 20ms loss 1%", "delay 50ms 10ms loss 3%", "rate 10mbit delay 30ms loss 5%"]
+
+
+@dataclass
+class Suite:
+    name: str
+    version: str
+    licence: str
+    # Features for the tests, as the project itself chooses them.
+    features: list[str] = field(default_factory=list)
+    # Lines of a manifest: dependencies that the project's own workspace brings, and the archive does not name.
+    beside: list[str] = field(default_factory=list)
+    # Environment of the tests with `cohaptic test`.
+    variables: dict[str, str] = field(default_factory=dict)
+    # Runs under load at most: slow suites have fewer.
+    loads: int = 100
+    # Tests that fail on an ideal loopback, and why.
+    limits: dict[str, str] = field(default_factory=dict)
+
+
+SUITES = [
+    Suite("mini-redis", "0.4.1", "MIT"),
+    # A lock keeps the tests apart. A test bed cannot wait for another thread, so that its tests run one after the other on one thread.
+    Suite("bore-cli", "0.6.0", "MIT", variables={"RUST_TEST_THREADS": "1"}),
+    Suite("chitchat", "0.10.1", "MIT", loads=10),
+    # The macro of the tests is a private feature, which the archive of axum takes from a path.
+    Suite("axum", "0.8.9", "MIT", features=["http2", "macros", "multipart", "ws"], beside=['axum-macros = { version = "0.5", features = ["__private"] }']),
+    Suite("quinn", "0.11.12", "MIT OR Apache-2.0"),
+]
