@@ -104,10 +104,11 @@ impl Shared {
         self.face.addresses(name).map(|addresses| (addresses, self.six_first))
     }
 
-    /// Returns the time of the run, also while the state answers on this thread: then the time is that of the state.
+    /// Returns the time of the run without letting time pass. Nothing is woken: tokio itself reads a clock of the standard library between a poll and its driver,
+    /// when tokio drops a task that is woken.
     #[cfg(feature = "facade")]
     pub(crate) fn any_now(&self) -> Instant {
-        if self.is_synced() { self.face.now() } else { self.try_with(|core| core.now()).unwrap_or_else(|| self.face.now()) }
+        self.ahead().unwrap_or_else(|| self.face.now())
     }
 
     /// Returns the reading of the monotonic clock that stands for [`Instant::ZERO`].
@@ -285,24 +286,21 @@ impl Shared {
             visit.other = HERE.with_borrow_mut(|here| std::mem::replace(&mut **here, home.take()));
             visit.home = Some(home);
         }
-        HERE.with_borrow_mut(|here| self.follow(here.as_mut().expect("no other thread has the state")));
+        #[cfg(feature = "tokio")]
+        if let Some(now) = self.ahead() {
+            HERE.with_borrow_mut(|here| here.as_mut().expect("no other thread has the state").pass_until(now));
+        }
         visit
     }
 
-    /// Lets time pass until the time of tokio's clock, unless the state is at that time.
-    #[cfg_attr(not(feature = "tokio"), expect(unused_variables, clippy::needless_pass_by_ref_mut, reason = "no other clock moves by itself"))]
-    fn follow(&self, core: &mut Core) {
-        match self.clock {
-            Clock::Own => {}
-            #[cfg(feature = "tokio")]
-            Clock::Tokio { origin } => {
-                // After the end of the run this thread may have the clock of another test bed, and after `block_on` tokio's clock is that of the machine. Both
-                // clocks would move the state to a wrong time.
-                if !self.is_synced() && !self.has_ended() && tokio::runtime::Handle::try_current().is_ok() {
-                    core.pass_until(Instant::ZERO + origin.elapsed());
-                }
-            }
-        }
+    /// Returns the time of tokio's clock if the clock may be ahead of the state.
+    #[cfg(feature = "tokio")]
+    fn ahead(&self) -> Option<Instant> {
+        let Clock::Tokio { origin } = self.clock else { return None };
+        // After the end of the run this thread may have the clock of another test bed, and after `block_on` tokio's clock is that of the machine. Both clocks
+        // would move the state to a wrong time.
+        let is_running = !self.is_synced() && !self.has_ended() && tokio::runtime::Handle::try_current().is_ok();
+        is_running.then(|| Instant::ZERO + origin.elapsed())
     }
 
     fn lock_home(&self) -> MutexGuard<'_, Option<Box<Core>>> {
