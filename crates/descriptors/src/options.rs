@@ -57,6 +57,8 @@ pub(crate) fn write(socket: &SockRef<'_>, setting: Setting) -> io::Result<()> {
         Setting::ReusePort(on) => set_reuse_port(socket, on),
         Setting::OnlyV6(on) => socket.set_only_v6(on),
         Setting::Broadcast(on) => socket.set_broadcast(on),
+        // A socket of IPv6 has this option of IPv4 on Linux alone.
+        Setting::MulticastTtl(_) if is_six && !cfg!(any(target_os = "linux", target_os = "android")) => Ok(()),
         Setting::MulticastTtl(ttl) => socket.set_multicast_ttl_v4(ttl),
         Setting::MulticastLoop(on) if is_six => socket.set_multicast_loop_v6(on),
         Setting::MulticastLoop(on) => socket.set_multicast_loop_v4(on),

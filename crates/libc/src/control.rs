@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn written_messages_are_read() {
         let mut memory = [0_u64; 16];
-        let start: *mut c_void = memory.as_mut_ptr().cast();
+        let start = memory.as_mut_ptr().cast();
         let mut writer = Writer { start, room: 60, used: 0, is_cut: false };
         // SAFETY: the memory has 128 bytes, of which 60 are named.
         unsafe {
@@ -166,14 +166,15 @@ mod tests {
         let sending = unsafe { read(&message(&mut memory, 56)) }.unwrap();
         assert_eq!(sending, Sending { to: None, from: Some([10, 0, 0, 3].into()), ecn: 2 });
         // As with Linux, the buffer need not be aligned.
-        // SAFETY: the memory has 128 bytes, and the message names 56 of them after the first one.
-        let sending = unsafe {
-            memory.as_mut_ptr().cast::<u8>().copy_to(start.cast::<u8>().add(1), 56);
-            let mut unaligned = message(&mut memory, 56);
-            unaligned.msg_control = start.byte_add(1);
+        let mut unaligned = message(&mut memory, 56);
+        // SAFETY: the memory has 128 bytes, of which the first 56 move by one byte. The message then names those bytes.
+        let unaligned_sending = unsafe {
+            let control = unaligned.msg_control;
+            control.cast::<u8>().copy_to(control.cast::<u8>().add(1), 56);
+            unaligned.msg_control = control.byte_add(1);
             read(&unaligned)
         };
-        assert_eq!(sending.unwrap().ecn, 2);
+        assert_eq!(unaligned_sending.unwrap(), sending);
     }
 
     #[test]
