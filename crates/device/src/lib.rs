@@ -36,6 +36,7 @@
 #![cfg_attr(test, allow(clippy::float_cmp, clippy::unwrap_used, clippy::panic, reason = "tests compare exact values and count samples"))]
 
 mod contract;
+mod dice;
 mod force;
 mod gate;
 mod limits;
@@ -43,6 +44,7 @@ mod mailbox;
 mod stopper;
 
 pub use contract::{Description, Device, Reading};
+pub use dice::Dice;
 pub use force::GatedForce;
 pub use gate::{Admitted, Changes, Gate, Moment, Verdict, ZeroCause};
 pub use limits::{Limits, LimitsError};

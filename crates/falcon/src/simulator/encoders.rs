@@ -1,6 +1,7 @@
 //! Simulated incremental encoders: whole counts with a random zero until the index has passed.
 
-use super::faults::Dice;
+use cohaptic_device::Dice;
+
 use crate::kinematics::Triple;
 
 /// Greatest offset of an encoder that is not homed \[counts\].

@@ -27,6 +27,7 @@ pub use transport::{SharedSimulator, SimulatedTransport};
 use core::fmt;
 use core::time::Duration;
 
+use cohaptic_device::Dice;
 use cohaptic_units::Instant;
 
 use crate::ftdi::{BAUD_HANDSHAKE, BAUD_RUNNING, DTR_HIGH, DTR_LOW, PURGE_RX, PURGE_TX};
@@ -35,7 +36,6 @@ use crate::protocol::{Buttons, Leds};
 use crate::transport::Request;
 use chip::Chip;
 use encoders::Encoders;
-use faults::Dice;
 use mechanics::Mechanics;
 use program::Program;
 
@@ -104,7 +104,7 @@ impl Simulator {
 
     /// Delivers a byte to the device, and the answer of the device to the chip.
     fn hear(&mut self, at: Instant, byte: u8) {
-        let Some(byte) = self.dice.pass(byte, self.faults.drop_to_device, self.faults.garble_to_device) else { return };
+        let Some(byte) = faults::pass(&mut self.dice, byte, self.faults.drop_to_device, self.faults.garble_to_device) else { return };
         let was_homing = self.program.homing();
         let answer = self.program.hear(at, byte, self.chip.divisor(), self.dtr, &self.config, &self.faults, &self.encoders);
         // The firmware forgets the homing at the packet that clears the homing bit.
@@ -120,7 +120,7 @@ impl Simulator {
                 let strange = self.dice.byte();
                 self.chip.send_to_host(at, strange);
             }
-            if let Some(byte) = self.dice.pass(*byte, self.faults.drop_to_host, self.faults.garble_to_host) {
+            if let Some(byte) = faults::pass(&mut self.dice, *byte, self.faults.drop_to_host, self.faults.garble_to_host) {
                 // The answer leaves at the arrival of the last byte of the packet.
                 self.chip.send_to_host(at, byte);
             }

@@ -13,11 +13,11 @@ mod text;
 use core::time::Duration;
 use std::collections::{BTreeMap, VecDeque};
 
+use cohaptic_device::Dice;
 use cohaptic_units::Instant;
 
 use crate::axes::{Triple, to_scene};
 use crate::protocol::{Event, Format, Request};
-use faults::Dice;
 use grip::Grip;
 use text::Text;
 
