@@ -34,6 +34,8 @@ impl DocumentSchema {
     pub(crate) const RELAY: Self = Self { name: "cohaptic/relay", version: 1 };
     pub(crate) const RELAY_TCP: Self = Self { name: "cohaptic/relay-tcp", version: 1 };
     pub(crate) const ROUTER: Self = Self { name: "cohaptic/router", version: 1 };
+    pub(crate) const EXEC: Self = Self { name: "cohaptic/exec", version: 1 };
+    pub(crate) const EXEC_TRIALS: Self = Self { name: "cohaptic/exec-trials", version: 1 };
     pub(crate) const FALCON_PROBE: Self = Self { name: "cohaptic/falcon-probe", version: 1 };
     pub(crate) const FALCON_HOME: Self = Self { name: "cohaptic/falcon-home", version: 1 };
     pub(crate) const FALCON_WATCH: Self = Self { name: "cohaptic/falcon-watch", version: 1 };

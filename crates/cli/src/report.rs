@@ -17,19 +17,34 @@ use crate::output;
 
 /// Prints a failure on standard error, and under `--json` also as a document on standard output. Returns the exit status.
 pub(crate) fn report(failure: &Failure) -> ExitCode {
-    let status = failure.status();
+    report_with(failure, failure.status())
+}
+
+/// Like [`report`], with the exit status of a command that has other statuses than those of failures.
+pub(crate) fn report_with(failure: &Failure, status: u8) -> ExitCode {
     // A reader that closes a pipe has read enough. This is no error for the user, so no message is printed.
-    if status == CLOSED {
+    if failure.status() == CLOSED {
         return ExitCode::from(status);
     }
     let message = failure.message();
-    let (kind, colour) = if status == INTERRUPTED { ("interrupted", AnsiColor::Yellow) } else { ("error", AnsiColor::Red) };
+    let (kind, colour) = if failure.status() == INTERRUPTED { ("interrupted", AnsiColor::Yellow) } else { ("error", AnsiColor::Red) };
     let style = if AutoStream::choice(&io::stderr()) == ColorChoice::Never { Style::new() } else { colour.on_default().bold() };
     // If standard error cannot be written to, only the exit status tells of the failure.
     let _ = io::stderr()
         .write_all(visible_lines(&format!("{kind}: {message}\n")).replacen(&format!("{kind}:"), &format!("{style}{kind}:{style:#}"), 1).as_bytes());
     if output::wants_json_error() {
         let _ = print(failure, &message, status);
+    }
+    ExitCode::from(status)
+}
+
+/// Prints a line about a command of the user that could not be run, with the name of the program in front, and under `--json` a document. Returns the exit
+/// status.
+pub(crate) fn command_failed(program: &str, why: &str, status: u8) -> ExitCode {
+    // Without standard error only the status tells of the failure.
+    let _ = write!(io::stderr(), "{}", visible_lines(&format!("{program}: {why}\n")));
+    if output::wants_json_error() {
+        let _ = print_without_place(why, status);
     }
     ExitCode::from(status)
 }
@@ -92,7 +107,10 @@ fn print(failure: &Failure, message: &str, status: u8) -> Result<(), Failure> {
 
 /// Prints the document of invalid arguments.
 fn print_usage(message: &str, status: u8) -> Result<(), Failure> {
-    let message = message.strip_prefix("error: ").unwrap_or(message).trim_end();
+    print_without_place(message.strip_prefix("error: ").unwrap_or(message).trim_end(), status)
+}
+
+fn print_without_place(message: &str, status: u8) -> Result<(), Failure> {
     output::json(DocumentSchema::ERROR, &document! { status: status, message: message, place: None::<()> })
 }
 

@@ -33,6 +33,20 @@ impl CommandLine {
         line.option("--set", set)
     }
 
+    /// Begins a command with plain words, such as those of a link.
+    pub(crate) fn of_words(command: &str, words: &[String]) -> Self {
+        let words = words.iter().map(|word| quoted(word));
+        Self { words: std::iter::once(format!("cohaptic {command}")).chain(words).collect(), reads_standard_input: false }
+    }
+
+    /// Appends another program with its arguments, after two dashes. Appends nothing for an empty list.
+    pub(crate) fn program(mut self, words: impl IntoIterator<Item = impl AsRef<str>>) -> Self {
+        let mut words = words.into_iter().map(|word| quoted(word.as_ref())).peekable();
+        self.words.extend(words.peek().is_some().then(|| "--".to_owned()));
+        self.words.extend(words);
+        self
+    }
+
     /// Appends an option once per value, so that an option without a value is left out.
     pub(crate) fn option(mut self, name: &str, values: impl IntoIterator<Item = impl Display>) -> Self {
         self.words.extend(values.into_iter().map(|value| format!("{name} {}", quoted(&value.to_string()))));
@@ -68,6 +82,9 @@ mod tests {
         let text = line.option("--seed", Some(7)).option("--grid", none).flag("--force", true).flag("--general", false).out().text();
         assert_eq!(text, "cohaptic run 'a b.toml' --set x=1 --set 'y=\"z\"' --seed 7 --force --out DIR");
         assert_eq!(CommandLine::new("run", Path::new("-"), &[]).out().text(), "cohaptic run - --out DIR < scene.toml");
+        let line = CommandLine::of_words("exec", &["delay 8ms".to_owned()]).option("--seed", Some(7));
+        assert_eq!(line.program(["sh", "-c", "exit 1"]).text(), "cohaptic exec 'delay 8ms' --seed 7 -- sh -c 'exit 1'");
+        assert_eq!(CommandLine::of_words("exec", &[]).program([""; 0]).text(), "cohaptic exec");
     }
 
     #[test]

@@ -16,7 +16,7 @@ use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use cohaptic_exec::{GATEWAY, GatewayPlan, HostPlan, PREFIX, Plan, Setup, host};
+use cohaptic_exec::{GATEWAY, GatewayPlan, HostPlan, Output, PREFIX, Plan, Setup, host};
 use cohaptic_linkfile::router::Network;
 use cohaptic_linkfile::{LinkTable, link_from_keys};
 use cohaptic_realtime::{Pacing, Tolerance, Wishes};
@@ -129,7 +129,7 @@ fn through(server: SocketAddr, delay: &str) -> Result<String, Box<dyn Error>> {
     let command = vec![std::env::current_exe()?.into(), CLIENT.into(), address.into()];
     let plan = Plan {
         seed: 0,
-        hosts: vec![HostPlan { name: CLIENT.to_owned(), setup, command, is_main: true, ready: None, is_piped: true }],
+        hosts: vec![HostPlan { name: CLIENT.to_owned(), setup, command, is_main: true, ready: None, output: Output::Lines }],
         gateway: Some(GatewayPlan { name: "world".to_owned(), name_server: None, listen: Vec::new() }),
         links: LinkTable::uniform(2, link_from_keys(&[format!("delay={delay}")])?),
         pacing: Pacing::Sleep,

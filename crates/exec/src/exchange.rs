@@ -71,8 +71,8 @@ pub struct Counts {
 const MOST_PACKETS: i64 = 262_144;
 const MOST_BYTES: i64 = 256 << 20;
 
-/// Dropped packets of a link that are remembered by number. Enough for a short test; the counters of the link count all.
-const MOST_NAMED: usize = 32;
+/// Dropped packets of a link that are remembered by number. Enough for a test; the counters of the link count all.
+const MOST_NAMED: usize = 1000;
 
 /// Time after which cross packets are computed without a packet to meet the cross packets, as in [`cohaptic_router::Engine`].
 const CATCH_UP: Duration = Duration::from_millis(10);
@@ -212,7 +212,7 @@ impl Exchange {
         self.network.link_stats(from, to)
     }
 
-    /// Returns the numbers of the packets that the link from one host to another dropped, in the order of the drops: the first 32 of them. Packets are numbered
+    /// Returns the numbers of the packets that the link from one host to another dropped, in the order of the drops: the first 1000 of them. Packets are numbered
     /// from 0 on each link, as by the key `loss.packets`.
     #[must_use]
     pub fn dropped(&self, from: NodeId, to: NodeId) -> &[u64] {
@@ -274,12 +274,12 @@ mod tests {
         let mut some = exchange(&["loss={packets=[1,3]}", "delay=1ms"]);
         let mut all = exchange(&["loss=100%"]);
         for exchange in [&mut some, &mut all] {
-            for _ in 0..40 {
+            for _ in 0..1040 {
                 exchange.handle_packet(Instant::ZERO, NodeId(0), datagram([10, 0, 0, 2]));
             }
         }
         assert_eq!((some.dropped(NodeId(0), NodeId(1)), some.dropped(NodeId(1), NodeId(0))), (&[1, 3][..], &[][..]));
-        assert_eq!(all.dropped(NodeId(0), NodeId(1)), (0..32).collect::<Vec<_>>());
+        assert_eq!(all.dropped(NodeId(0), NodeId(1)), (0..1000).collect::<Vec<_>>());
     }
 
     #[test]

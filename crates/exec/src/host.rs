@@ -17,6 +17,17 @@ pub(crate) struct Host {
     pub(crate) channel: Channel,
 }
 
+/// Way of a command's output.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Output {
+    /// The command has the standard input, output and error of this program.
+    Shared,
+    /// As [`Output::Shared`], but the standard output goes to the standard error of this program.
+    ToError,
+    /// Standard output and error go line by line to the listener of [`run`](crate::run). The standard input is empty.
+    Lines,
+}
+
 /// Failure of a command, or of this program before the command.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("{why}")]
@@ -34,9 +45,8 @@ impl Failed {
 }
 
 impl Host {
-    /// Starts the processes of a host. The command waits for [`Host::start`]. `is_piped`: the output of the command can be read, and does not go where this
-    /// program's output goes.
-    pub(crate) fn begin(setup: &Setup, command: &[OsString], is_piped: bool) -> Result<Self, Failed> {
+    /// Starts the processes of a host. The command waits for [`Host::start`].
+    pub(crate) fn begin(setup: &Setup, command: &[OsString], output: Output) -> Result<Self, Failed> {
         let failed = |what: &str| {
             let what = what.to_owned();
             move |error: io::Error| Failed::own(format!("cannot {what}: {error}"))
@@ -45,8 +55,14 @@ impl Host {
         let own = std::env::current_exe().map_err(failed("find the file of this program"))?;
         let mut process = Command::new(own);
         process.args([MARK, ENTER, &setup.to_text()]).args(command).stdin(Stdio::from(inside.into_descriptor()));
-        if is_piped {
-            process.stdout(Stdio::piped()).stderr(Stdio::piped());
+        match output {
+            Output::Shared => {}
+            Output::ToError => {
+                process.stdout(io::stderr().as_fd().try_clone_to_owned().map_err(failed("copy standard error"))?);
+            }
+            Output::Lines => {
+                process.stdout(Stdio::piped()).stderr(Stdio::piped());
+            }
         }
         let child = process.spawn().map_err(failed("start this program again"))?;
         Ok(Self { child, channel: outside })

@@ -9,6 +9,8 @@
 //!   Gateway: sockets of the real machine      │
 //! ```
 //!
+//! A [`Search`] runs a plan with many seeds, and finds the smallest set of lost packets with which the command fails.
+//!
 //! [`run`] runs a [`Plan`]: hosts with their commands, links between the hosts, and a [`Gateway`] to the real world. An [`Exchange`] is the network without a
 //! clock. The processes inside are the program itself, which must call [`run_inside`] first of all.
 //!
@@ -42,13 +44,17 @@ mod exchange;
 mod gateway;
 mod host;
 mod inside;
+mod lost;
 mod name_server;
+mod search;
 mod session;
 mod signals;
 
 pub use exchange::{Counts, Departure, Exchange, Node};
 pub use gateway::{DNS, GATEWAY, Gateway, NAMES, PREFIX, host};
-pub use host::Failed;
+pub use host::{Failed, Output};
 pub use inside::{Setup, run as run_inside};
+pub use lost::{LostPacket, LostPackets};
 pub use name_server::name_server;
+pub use search::{Case, Count, Found, Search, Step, Trial, Tried};
 pub use session::{GatewayPlan, HostPlan, Line, LinkReport, Outcome, Plan, Report, Stream, capture_path, run};

@@ -21,7 +21,7 @@ pub(super) fn of_exec() -> String {
     after(EXEC).replace(
         EXIT_STATUS,
         "Exit status: that of the command, 128 plus the number of the signal that ended it, 125 if cohaptic failed, 126 if the command cannot be executed, \
-        127 if it is not found.",
+        127 if it is not found. With --seeds or --runs 0 if no run failed, and else the status of the last run that failed.",
     )
 }
 
@@ -151,6 +151,8 @@ const EXEC: &[&str] = &[
     "cohaptic exec 'delay 50ms loss 1%' --back 'delay 50ms rate 10mbit' -- python3 client.py",
     "cohaptic exec 'delay 20ms 5ms' --listen 8080 -- node server.js",
     "cohaptic exec net.toml --set link.loss=5% --out out",
+    "cohaptic exec 'delay 20ms loss 5%' --seeds 1..40 -- python3 -m pytest",
+    "cohaptic exec 'delay 20ms' --lose 'command->world:0' --runs 10 -- npm test",
 ];
 
 pub(super) const TOKIO: &[&str] = &["cohaptic tokio", "cohaptic tokio --sim tests/network"];

@@ -2,14 +2,14 @@
 
 use std::ffi::OsString;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
-use std::time::Duration;
 
 use clap::Args;
-use cohaptic_units::parse;
 
 use super::examples;
 use super::numbers::integer;
+use super::realtime::PaceArguments;
 
 #[derive(Debug, Args)]
 #[command(after_help = examples::of_exec(), override_usage = USAGE)]
@@ -40,18 +40,38 @@ pub(crate) struct ExecArguments {
     /// Seed of all random numbers [default: that of the file, or 0]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u64>(0, i64::MAX.unsigned_abs()))]
     pub(crate) seed: Option<u64>,
-    /// Wake up to 120 µs before each deadline and spin: more punctual, and keeps a core busy
+    /// Lose these packets of a link, counted from 0, and none by chance, repeatable: --lose 'command -> world: 0, 3'. none loses none
+    #[arg(long, value_name = "FROM -> TO: N,... | none", conflicts_with = "seeds")]
+    pub(crate) lose: Vec<String>,
+    /// Run the command with each of these seeds and say which fail. Then search for the fewest lost packets with which the command fails, and print the
+    /// command line that loses them. The command has an empty standard input
+    #[arg(long, value_name = "A..B", value_parser = seeds, conflicts_with = "seed")]
+    pub(crate) seeds: Option<RangeInclusive<u64>>,
+    /// Run the command this many times and count its failures. With --seeds: lost packets have to fail as many times [default with --seeds: 5]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u32>(1, 1_000_000))]
+    pub(crate) runs: Option<u32>,
+    /// Try no seed after one whose lost packets fail each time
+    #[arg(long, requires = "seeds")]
+    pub(crate) until_failure: bool,
+    /// Print one JSON document on standard output and nothing else. The output of the command goes to standard error
     #[arg(long)]
-    pub(crate) spin: bool,
-    /// Do not ask the system for SCHED_FIFO and locked memory
-    #[arg(long)]
-    pub(crate) no_priority: bool,
-    /// Accept this lateness: the report calls a run not valid if more than one in a thousand packets was later [default: that of the file, or 1ms]
-    #[arg(long, value_name = "TIME", value_parser = parse::duration)]
-    pub(crate) tolerance: Option<Duration>,
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) pace: PaceArguments,
 }
 
 const USAGE: &str = "cohaptic exec [OPTIONS] <SPEC>... -- <COMMAND>...\n       cohaptic exec [OPTIONS] <FILE>";
+
+/// Reads a first and a last seed: `1..40`.
+fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
+    let seed = integer::<u64>(0, i64::MAX.unsigned_abs());
+    let (first, last) = text.split_once("..").ok_or("expected the first and the last seed, such as 1..40")?;
+    let (first, last) = (seed(first)?, seed(last)?);
+    if first > last {
+        return Err(format!("the last seed is below the first: expected {last}..{first}"));
+    }
+    Ok(first..=last)
+}
 
 /// Reads an address with a port, or a port of 127.0.0.1.
 fn listened(text: &str) -> Result<SocketAddr, String> {

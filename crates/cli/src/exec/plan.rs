@@ -2,14 +2,14 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Duration;
 
-use cohaptic_exec::{GATEWAY, GatewayPlan, HostPlan, NAMES, PREFIX, Plan, Setup, host};
+use cohaptic_exec::{GATEWAY, GatewayPlan, HostPlan, NAMES, Output, PREFIX, Plan, Setup, host};
 use cohaptic_linkfile::router::Network;
 use cohaptic_linkfile::{ExecFile, LinkTable};
-use cohaptic_realtime::{Pacing, Tolerance, Wishes};
+use cohaptic_realtime::Tolerance;
 use cohaptic_wan::LinkModel;
 
+use super::lost;
 use crate::arguments::ExecArguments;
 use crate::failure::Failure;
 use crate::input;
@@ -24,14 +24,21 @@ const MACHINE: &str = "host";
 
 /// Returns the plan of the arguments.
 pub(super) fn plan(arguments: &ExecArguments) -> Result<Plan, Failure> {
-    match (arguments.command.is_empty(), arguments.spec.as_slice()) {
-        (false, _) => of_command(arguments),
-        (true, [file]) if Path::new(file).exists() || input::is_standard_input(Path::new(file)) => of_file(arguments, Path::new(file)),
-        (true, spec) => Err(Failure::Input(format!(
-            "{:?} is not a file: expected a file of hosts, or a command after two dashes: cohaptic exec 'delay 50ms loss 1%' -- curl http://host:8000/",
-            spec.join(" ")
-        ))),
+    let plan = match (arguments.command.is_empty(), arguments.spec.as_slice()) {
+        (false, _) => of_command(arguments)?,
+        (true, [file]) if Path::new(file).exists() || input::is_standard_input(Path::new(file)) => of_file(arguments, Path::new(file))?,
+        (true, spec) => {
+            return Err(Failure::Input(format!(
+                "{:?} is not a file: expected a file of hosts, or a command after two dashes: cohaptic exec 'delay 50ms loss 1%' -- curl http://host:8000/",
+                spec.join(" ")
+            )));
+        }
+    };
+    if arguments.lose.is_empty() {
+        return Ok(plan);
     }
+    let lost = lost::read(&arguments.lose, &plan.nodes())?;
+    Ok(plan.losing(&lost))
 }
 
 /// Returns the plan of a single command, with the link between the command and the real world.
@@ -45,7 +52,7 @@ fn of_command(arguments: &ExecArguments) -> Result<Plan, Failure> {
         command: arguments.command.clone(),
         is_main: true,
         ready: None,
-        is_piped: false,
+        output: if arguments.json { Output::ToError } else { Output::Shared },
     };
     let links = LinkTable::new(2, Arc::new(there), [((1, 0), Arc::new(back))]);
     Ok(whole(arguments, vec![command], Some(gateway), links))
@@ -64,12 +71,12 @@ fn of_file(arguments: &ExecArguments, path: &Path) -> Result<Plan, Failure> {
             command: of.command.iter().map(Into::into).collect(),
             is_main: of.is_main,
             ready: of.ready.clone(),
-            is_piped: true,
+            output: Output::Lines,
         }
     });
     let hosts = hosts.collect();
     let plan = whole(arguments, hosts, gateway, file.links);
-    Ok(Plan { seed: arguments.seed.unwrap_or(file.seed), tolerance: Tolerance { limit: arguments.tolerance.unwrap_or(file.tolerance) }, ..plan })
+    Ok(Plan { seed: arguments.seed.unwrap_or(file.seed), tolerance: Tolerance { limit: arguments.pace.tolerance.unwrap_or(file.tolerance) }, ..plan })
 }
 
 /// Returns the index of a host as a part of its address. A file has few hosts.
@@ -100,9 +107,9 @@ fn whole(arguments: &ExecArguments, hosts: Vec<HostPlan>, gateway: Option<Gatewa
         hosts,
         gateway,
         links,
-        pacing: if arguments.spin { Pacing::SPIN } else { Pacing::Sleep },
-        wishes: if arguments.no_priority { Wishes::NONE } else { Wishes::default() },
-        tolerance: Tolerance { limit: arguments.tolerance.unwrap_or(Duration::from_millis(1)) },
+        pacing: arguments.pace.pacing(),
+        wishes: arguments.pace.wishes(),
+        tolerance: arguments.pace.tolerance(),
         captures: arguments.out.clone(),
     }
 }

@@ -18,7 +18,7 @@ use crate::integration::running::{PATIENCE, Running};
 const ROLE: &str = "COHAPTIC_CLI_TEST_EXEC";
 
 /// Returns whether namespaces and devices can be made here, and says why not.
-fn can_run() -> bool {
+pub(super) fn can_run() -> bool {
     let can = Command::new("unshare").args(["-Urnm", "true"]).stderr(Stdio::null()).status().is_ok_and(|status| status.success());
     if !can {
         println!("skipped: this system allows no namespaces (`unshare -Urnm true` fails)");
@@ -32,7 +32,7 @@ fn can_run() -> bool {
 }
 
 /// Returns `cohaptic exec OPTIONS -- ` with this test program as the command, in a role of [`be_inside`].
-fn with_role(desk: &Desk, options: &str, role: &str) -> Command {
+pub(super) fn with_role(desk: &Desk, options: &str, role: &str) -> Command {
     let mut command = desk.command(&format!("exec {options} --no-priority --"));
     command.arg(env::current_exe().unwrap()).args(["integration::exec::be_inside", "--exact", "--nocapture"]).env(ROLE, role);
     command
@@ -86,6 +86,20 @@ fn be_inside() {
             let mut answer = [0; 64];
             let length = udp.recv(&mut answer).unwrap();
             println!("inside: {} {}", String::from_utf8_lossy(&answer[..length]), begin.elapsed().as_millis());
+        }
+        // Asks by datagrams, and fails if a question or its answer is lost: without a repetition each number of a packet is that of its question.
+        ["each", to, count] => {
+            let udp = UdpSocket::bind("0.0.0.0:0").unwrap();
+            udp.connect(*to).unwrap();
+            udp.set_read_timeout(Some(Duration::from_millis(1500))).unwrap();
+            for question in 0..count.parse().unwrap() {
+                udp.send(&[question]).unwrap();
+                let mut answer = [0];
+                if udp.recv(&mut answer).is_err() {
+                    println!("inside: question {question} has no answer");
+                    std::process::exit(7);
+                }
+            }
         }
         // A datagram that is longer than a packet, and its echo.
         ["long", to] => {
@@ -448,7 +462,7 @@ fn the_folder_gets_a_capture_and_a_report() {
 }
 
 /// A file with a server and a client, whose further keys and commands are given.
-fn net(server: &str, client: &str) -> String {
+pub(super) fn net(server: &str, client: &str) -> String {
     format!("[[hosts]]\nname = \"server\"\n{server}\n[[hosts]]\nname = \"client\"\n{client}\n[link]\ndelay = \"10ms\"\n")
 }
 

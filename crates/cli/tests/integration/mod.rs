@@ -22,6 +22,8 @@ mod driverless;
 mod errors;
 #[cfg(unix)]
 mod exec;
+#[cfg(unix)]
+mod exec_trials;
 mod existing;
 mod explain;
 #[cfg(feature = "falcon")]

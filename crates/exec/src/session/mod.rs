@@ -1,6 +1,7 @@
 //! A whole run: hosts with their commands, links, and the gateway.
 
 mod output;
+mod trial;
 mod watch;
 
 use core::time::Duration;
@@ -20,12 +21,12 @@ use nix::sys::signalfd::SignalFd;
 use crate::emulation::{Capture, Emulation, Port};
 use crate::exchange::{Counts, Exchange, Node};
 use crate::gateway::Gateway;
-use crate::host::{Failed, Host};
+use crate::host::{Failed, Host, Output};
 use crate::inside::Setup;
 use crate::signals;
 use output::Outputs;
 pub use output::{Line, Stream};
-use watch::Watch;
+use watch::{Ended, Watch};
 
 /// Hosts, links and gateway of a run.
 #[derive(Clone, Debug)]
@@ -61,8 +62,8 @@ pub struct HostPlan {
     pub is_main: bool,
     /// Text in the output after which the next hosts may start, or `None` if the next hosts may start at once.
     pub ready: Option<String>,
-    /// `true` if the output goes line by line to the listener of [`run`], `false` if the command has the standard input and output of this program.
-    pub is_piped: bool,
+    /// Way of the command's output.
+    pub output: Output,
 }
 
 /// Way to the real world.
@@ -83,6 +84,8 @@ pub struct Outcome {
     pub status: u8,
     /// Exit status of each command, or `None` for a command ended by force.
     pub statuses: Vec<Option<u8>>,
+    /// Number of the first signal of SIGHUP, SIGINT, SIGQUIT and SIGTERM that this program had during the run, or `None` for none.
+    pub signal: Option<u8>,
     /// Counters of the links.
     pub report: Report,
 }
@@ -105,7 +108,7 @@ pub struct LinkReport {
 pub struct Report {
     /// Length of the run.
     pub elapsed: Duration,
-    /// What passed each link.
+    /// Counters of each link, by sender and receiver.
     pub links: Vec<LinkReport>,
     /// Names of the hosts, and of the gateway.
     pub nodes: Vec<String>,
@@ -136,7 +139,7 @@ pub fn run(plan: &Plan, hear: &(dyn Fn(Line<'_>) + Sync)) -> Result<Outcome, Fai
     // All processes are started before the first device is awaited, so that the namespaces are made in parallel.
     let mut hosts = Vec::new();
     for host in &plan.hosts {
-        hosts.push(Host::begin(&host.setup, &host.command, host.is_piped).map_err(|failed| named(plan, host, failed))?);
+        hosts.push(Host::begin(&host.setup, &host.command, host.output).map_err(|failed| named(plan, host, failed))?);
     }
     let mut ports = Vec::new();
     for (host, of) in hosts.iter().zip(&plan.hosts) {
@@ -176,8 +179,8 @@ pub fn run(plan: &Plan, hear: &(dyn Fn(Line<'_>) + Sync)) -> Result<Outcome, Fai
     })?;
     let (prepared, ran) = driven;
     ran.map_err(|error| Failed::own(format!("the network has failed: {error}")))?;
-    let (status, statuses) = ended;
-    Ok(Outcome { status, statuses, report: report(plan, &mut emulation, prepared) })
+    let Ended { status, statuses, signal } = ended;
+    Ok(Outcome { status, statuses, signal, report: report(plan, &mut emulation, prepared) })
 }
 
 /// Returns a failure with the name of its host, if there are several.

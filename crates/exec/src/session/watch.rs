@@ -13,7 +13,7 @@ use super::output::Outputs;
 use super::{Plan, named};
 use crate::channel::{Order, Report as Told};
 use crate::emulation::Stop;
-use crate::host::{Failed, Host};
+use crate::host::{Failed, Host, Output};
 use crate::signals;
 
 /// Time that commands have after SIGTERM until they are killed.
@@ -26,6 +26,16 @@ enum State {
     Waits,
     Runs,
     Ended(u8),
+}
+
+/// End of the commands.
+pub(super) struct Ended {
+    /// Status of the run.
+    pub(super) status: u8,
+    /// Status of each command, or `None` for a command ended by force.
+    pub(super) statuses: Vec<Option<u8>>,
+    /// Number of the first signal that asks programs to end, or `None` for none.
+    pub(super) signal: Option<u8>,
 }
 
 /// Watch over the commands: starts in turn, signals, and the end of all commands together.
@@ -41,17 +51,19 @@ pub(super) struct Watch<'a> {
     status: Option<u8>,
     /// Instant at which the remaining commands are killed; `None` before the run is ending.
     kill_at: Option<Instant>,
+    /// Number of the first signal that asks programs to end; `None` before.
+    signal: Option<u8>,
 }
 
 impl<'a> Watch<'a> {
     pub(super) fn new(plan: &'a Plan, hosts: &'a [Host], signals: &'a SignalFd, outputs: &'a Outputs) -> Self {
         let states = vec![State::Waits; hosts.len()];
         let hosts = hosts.iter().map(Some).collect();
-        Self { plan, hosts, states, signals, outputs, clock: MonotonicClock::start(), status: None, kill_at: None }
+        Self { plan, hosts, states, signals, outputs, clock: MonotonicClock::start(), status: None, kill_at: None, signal: None }
     }
 
-    /// Runs the commands until all commands have ended, or until the remaining commands have to be killed. Returns the status of the run and of each command.
-    pub(super) fn until_all_have_ended(mut self, stop: &Stop) -> Result<(u8, Vec<Option<u8>>), Failed> {
+    /// Runs the commands until all commands have ended, or until the remaining commands have to be killed.
+    pub(super) fn until_all_have_ended(mut self, stop: &Stop) -> Result<Ended, Failed> {
         while self.hosts.iter().any(Option::is_some) {
             self.start_ready()?;
             if self.kill_at.is_some_and(|at| self.clock.now() >= at) {
@@ -67,7 +79,7 @@ impl<'a> Watch<'a> {
         }
         stop.finish();
         let ended = |state: &State| if let State::Ended(status) = state { Some(*status) } else { None };
-        Ok((self.status.unwrap_or(0), self.states.iter().map(ended).collect()))
+        Ok(Ended { status: self.status.unwrap_or(0), statuses: self.states.iter().map(ended).collect(), signal: self.signal })
     }
 
     /// Starts each command for which all hosts before are ready.
@@ -76,7 +88,7 @@ impl<'a> Watch<'a> {
             // No command starts after the run has begun to end.
             if self.states[place] == State::Waits && self.kill_at.is_none() {
                 let Some(host) = self.hosts[place] else { continue };
-                let started = host.start(!self.plan.hosts[place].is_piped);
+                let started = host.start(self.plan.hosts[place].output != Output::Lines);
                 started.map_err(|error| Failed::own(format!("cannot start the command: {error}")))?;
                 self.states[place] = State::Runs;
             }
@@ -102,6 +114,9 @@ impl<'a> Watch<'a> {
             return Ok(());
         }
         let Some(got) = signals::read(self.signals)? else { return Ok(()) };
+        if !matches!(got.signal, Signal::SIGUSR1 | Signal::SIGUSR2) {
+            self.signal.get_or_insert(signals::number(got.signal));
+        }
         if !got.is_of_terminal {
             // Process 1 then has the signal too, if it was sent to the whole group.
             self.clock.block(Some(self.clock.now().saturating_add(signals::GROUP)), &[])?;

@@ -15,6 +15,7 @@ use crate::netem::{Netem, TableName};
 use crate::parameters::{Form, Key, NONE, Table, required, usual};
 use crate::stages::config::LINK_PARAMETERS;
 use crate::stages::config::{Layout, LinkConfig};
+use crate::stages::loss::Loss;
 use crate::stages::modulation::Modulated;
 use crate::stages::queue::Load;
 
@@ -143,6 +144,18 @@ impl LinkModel {
         }
     }
 
+    /// Returns this model with `loss` in place of its own model of loss, in each state of a modulator. Losses of recorded traces and of listed impairments
+    /// stay. A replay and the kernel's netem have no separate model of loss, and are returned unchanged.
+    #[must_use]
+    pub fn with_loss(&self, loss: &Loss) -> Self {
+        let losing = |config: &LinkConfig| LinkConfig { loss: loss.clone(), ..config.clone() };
+        match self {
+            Self::Fixed(config) => Self::Fixed(losing(config)),
+            Self::Modulated(modulated) => Self::Modulated(modulated.map_configs(losing)),
+            Self::Replay(_) | Self::Kernel(_) => self.clone(),
+        }
+    }
+
     /// Returns whether any part of this link is random.
     #[must_use]
     pub fn has_chance(&self) -> bool {
@@ -233,5 +246,38 @@ impl LinkModel {
             Self::Replay(log) => format!("a replay of {}, and nothing after it", Counted(log.packets(), "packet")),
             Self::Kernel(netem) => format!("netem of Linux 6.6, to the bit: {}", netem.words()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+
+    use cohaptic_units::Probability;
+
+    use super::*;
+    use crate::stages::delay::Delay;
+    use crate::stages::loss::Pattern;
+    use crate::stages::modulation::{Modulator, ModulatorState};
+
+    /// Each state of a modulator loses the chosen packets alone, and keeps its delay.
+    #[test]
+    fn another_loss_leaves_all_else_as_it_was() {
+        let chosen = Loss::Pattern(Pattern::of_packets(vec![2..3], None).unwrap());
+        let config = |millis| LinkConfig {
+            loss: Loss::Independent(Probability::new(0.5).unwrap()),
+            delay: Delay::constant(Duration::from_millis(millis)),
+            ..LinkConfig::default()
+        };
+        let fixed = LinkModel::from(config(8)).with_loss(&chosen);
+        assert_eq!(fixed, LinkModel::from(LinkConfig { loss: chosen.clone(), ..config(8) }));
+        let state = |next| ModulatorState { sojourn: None, next };
+        let modulator = Modulator::new("m", vec![state(vec![0.0, 1.0]), state(vec![1.0, 0.0])]).unwrap();
+        let LinkModel::Modulated(modulated) = LinkModel::from(Modulated::new(modulator, vec![config(8), config(9)]).unwrap()).with_loss(&chosen)
+        else {
+            panic!("the modulator stays");
+        };
+        let expected = [8, 9].map(|millis| LinkConfig { loss: chosen.clone(), ..config(millis) });
+        assert_eq!(modulated.configs(), expected);
     }
 }

@@ -236,6 +236,11 @@ impl Modulated {
         Self { modulator: self.modulator.renamed(name), configs: Arc::clone(&self.configs) }
     }
 
+    /// Returns the same link with other configurations, which must keep the order of stages.
+    pub(crate) fn map_configs(&self, map: impl Fn(&LinkConfig) -> LinkConfig) -> Self {
+        Self { modulator: self.modulator.clone(), configs: self.configs.iter().map(map).collect() }
+    }
+
     /// Returns the configurations, indexed by state.
     #[must_use]
     pub fn configs(&self) -> &[LinkConfig] {

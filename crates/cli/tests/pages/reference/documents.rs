@@ -106,8 +106,9 @@ fn documents_have_the_keys_of_the_page_and_no_other() {
         let mut all = BTreeSet::new();
         for line in document.lines {
             let folder = Folder::new();
-            let needs = if document.command == "router" { NAMESPACES } else { "python3" };
-            if line.contains("python3") && !folder.has(needs) {
+            let is_in_namespaces = document.command == "router" || document.command.starts_with("exec");
+            let needs = if is_in_namespaces { NAMESPACES } else { "python3" };
+            if (is_in_namespaces || line.contains("python3")) && !folder.has(needs) {
                 eprintln!("the document of {} is not read here, for want of `{needs}`", document.command);
                 continue;
             }

@@ -2,7 +2,7 @@
 
 use super::Document;
 
-pub(super) const REAL_TIME: [Document; 12] = [
+pub(super) const REAL_TIME: [Document; 14] = [
     Document {
         command: "live",
         lines: &[
@@ -114,6 +114,39 @@ pub(super) const REAL_TIME: [Document; 12] = [
             ("rules[].packets, rules[].bytes", "what each rule decided"),
             ("in_flight.packets, in_flight.bytes", "inside all links at the end"),
             ("granted, refused_wishes", "what the system granted and refused"),
+        ],
+    },
+    Document {
+        command: "exec",
+        lines: &["cohaptic exec 'delay 5ms' --out out --no-priority --json -- true 2> said"],
+        rows: &[
+            ("status, duration_s", "the exit status of the run; how long it ran"),
+            ("valid, release_error_us.@Lateness", "as of the [relay](#relay)"),
+            ("hosts[].name, hosts[].command, hosts[].status", "of each command its words and its exit status, or `null` if it was killed"),
+            ("links[].from, links[].to, links[].@Counters", "of each directed link"),
+            ("links[].dropped_packets", "numbers of the first 1000 dropped packets, counted from 0, as for `--lose`"),
+            ("links[].asked_mean_delay_s", "as configured; `null` where only a recording knows"),
+            ("untaken.no_host, untaken.malformed, untaken.overload", "packets that no link took, by reason"),
+            ("refused[].name, refused[].packets", "packets that the device of a host, or the gateway, did not take"),
+            ("granted, refused_wishes", "what the system granted and refused"),
+            ("files", "what was written"),
+        ],
+    },
+    Document {
+        command: "exec --seeds",
+        lines: &["cohaptic exec 'delay 5ms loss 50%' --seeds 1..3 --runs 2 --no-priority --json -- ping -c 1 -W 1 host 2> said"],
+        rows: &[
+            ("verdict", "`passed`, `failed`, or `elsewhere` if the command fails over ideal links too; also with `--runs` alone"),
+            ("status, printed", "exit status and last lines of the last failed run; 0 and empty if no run failed"),
+            ("seeds[].seed, seeds[].status", "of each seed the exit status; empty without `--seeds`"),
+            (
+                "seeds[].lost[].from, seeds[].lost[].to, seeds[].lost[].packets",
+                "the links that have dropped packets, and the numbers of these, at most 1000",
+            ),
+            ("lost[].from, lost[].to, lost[].packets", "the smallest set of lost packets that was found; `lost` is `null` without one"),
+            ("seed, command", "the seed of all other chance, and the command line that loses these packets; `null` without such a set"),
+            ("failed, of", "failures in how many runs, of the smallest set or of all equal runs; else `null`"),
+            ("runs, not_valid, packets", "all runs; those with late packets; packets offered to the links in all runs"),
         ],
     },
     Document {

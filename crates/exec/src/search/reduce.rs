@@ -1,0 +1,71 @@
+//! Reduction of a set of lost packets, in the manner of delta debugging (Zeller and Hildebrandt, 2002).
+
+use std::collections::BTreeSet;
+
+use crate::lost::{LostPacket, LostPackets};
+
+/// Sets that are tried at most, so that a reduction ends within minutes.
+const MOST_TRIED: usize = 200;
+/// Low numbers that are tried in the place of a packet's number, from 0.
+const LOW_NUMBERS: u64 = 16;
+
+/// Returns the smallest set that was found with which the program fails: `start`, or a set with fewer packets or lower numbers.
+///
+/// # Errors
+///
+/// The first error of `fails`.
+pub(super) fn reduce<E>(start: LostPackets, mut fails: impl FnMut(&LostPackets) -> Result<bool, E>) -> Result<LostPackets, E> {
+    // A set is not tried twice: each trial takes the time of a run.
+    let mut tried = BTreeSet::from([start.clone()]);
+    let mut best = start;
+    loop {
+        let mut smaller = None;
+        for candidate in candidates(&best) {
+            if tried.len() > MOST_TRIED {
+                break;
+            }
+            if tried.insert(candidate.clone()) && fails(&candidate)? {
+                smaller = Some(candidate);
+                break;
+            }
+        }
+        // Each accepted set has fewer packets, or as many with a lower sum of numbers, so the loop ends.
+        let Some(smaller) = smaller else { return Ok(best) };
+        best = smaller;
+    }
+}
+
+/// Returns the sets to be tried in place of a set, those that remove most first.
+fn candidates(of: &LostPackets) -> impl Iterator<Item = LostPackets> + '_ {
+    let all: Vec<LostPacket> = of.iter().collect();
+    without_parts(all.clone())
+        .chain(all.clone().into_iter().map(move |gone| renumbered(of, gone)))
+        .chain(all.into_iter().flat_map(move |packet| lowered(of, packet)))
+}
+
+/// Returns the sets without all packets, without each half, without each quarter and so on, down to the sets without one packet.
+fn without_parts(all: Vec<LostPacket>) -> impl Iterator<Item = LostPackets> {
+    let count = all.len();
+    let sizes = std::iter::successors(Some(count).filter(|count| *count > 0), |size| Some(size.div_ceil(2)).filter(|next| next < size));
+    sizes.flat_map(move |size| {
+        let all = all.clone();
+        (0..count).step_by(size).map(move |begin| {
+            let is_kept = |place: usize| place < begin || place >= begin + size;
+            all.iter().enumerate().filter(|(place, _)| is_kept(*place)).map(|(_, packet)| *packet).collect()
+        })
+    })
+}
+
+/// Returns the set without a packet, with the next number below for later packets of its link: a packet that is not lost is not sent again, so that all that
+/// follows has lower numbers.
+fn renumbered(of: &LostPackets, gone: LostPacket) -> LostPackets {
+    let lower =
+        |packet: LostPacket| if packet.is_beside(&gone) && packet > gone { LostPacket { number: packet.number - 1, ..packet } } else { packet };
+    of.iter().filter(|packet| *packet != gone).map(lower).collect()
+}
+
+/// Returns the sets with lower numbers for a packet, from 0: little has happened before a packet with a low number, so that its loss is the surest.
+fn lowered(of: &LostPackets, packet: LostPacket) -> impl Iterator<Item = LostPackets> + '_ {
+    let lower = (0..packet.number.min(LOW_NUMBERS)).map(move |number| LostPacket { number, ..packet });
+    lower.filter(|lower| !of.contains(lower)).map(move |lower| of.iter().filter(|other| *other != packet).chain([lower]).collect())
+}
