@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import time
+from itertools import combinations
 
 from suites import CUT, IDEAL, LOOPBACKS
 
@@ -18,9 +19,9 @@ PATIENCE = 300
 
 def called(command, folder, patience=None, **variables):
     """Calls a program. A program that takes longer than `patience` [s] is ended, and has no status."""
-    environment = {**os.environ, **variables}
+    streams = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True, "errors": "replace"}
     with contextlib.suppress(subprocess.TimeoutExpired):
-        return subprocess.run(command, cwd=folder, env=environment, timeout=patience, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace")
+        return subprocess.run(command, cwd=folder, env={**os.environ, **variables}, timeout=patience, check=False, **streams)
     return subprocess.CompletedProcess(command, None, "", "")
 
 
@@ -80,17 +81,16 @@ class Runs:
         if key in self.kept["smallest"]:
             return self.kept["smallest"][key]
         parts = re.findall(r"(?:delay|loss|rate)(?: [0-9]\S*)+", words)
-        for part in list(parts):
-            rest = [other for other in parts if other != part]
-            if rest and self.fails(test, " ".join(rest), seed):
-                parts = rest
+        # A part may become superfluous when another part has gone.
+        while fewer := next((rest for rest in combinations(parts, len(parts) - 1) if rest and self.fails(test, " ".join(rest), seed)), None):
+            parts = fewer
         delay = re.match(r"delay (\d+)ms", parts[0]) if len(parts) == 1 else None
         if delay and self.fails(test, delay[0], seed):
             low, high = 0, int(delay[1])
             while high - low > 1:
                 middle = (low + high) // 2
                 low, high = (low, middle) if self.fails(test, f"delay {middle}ms", seed) else (middle, high)
-            parts = [f"delay {high}ms"]
+            parts = (f"delay {high}ms",)
         return self.keep("smallest", key, " ".join(parts))
 
     def figures(self, seeds, loads):
@@ -119,8 +119,9 @@ class Runs:
             "limits": limits,
             "failures": [(test, words, found, self.smallest(test, words, found[0])) for (test, words), found in own],
             "loads": loads,
-            "real under load": [sorted(set(wrong) - set(real[0][0])) for wrong in real_under],
-            "beds under load": [wrong != self.bed(*turn)[0] for wrong, turn in zip(bed_under, turns)],
+            # Runs in which other tests fail than without load.
+            "real under load": sum(wrong != real[0][0] for wrong in real_under),
+            "bed under load": sum(wrong != self.bed(*turn)[0] for wrong, turn in zip(bed_under, turns)),
         }
 
 

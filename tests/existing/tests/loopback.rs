@@ -41,7 +41,8 @@ fn the_same_happens_twice_and_something_else_with_another_seed() {
     }
 }
 
-/// Tokio itself reads clocks of the standard library, also where it would drop a task that is woken. Packets arrive at whole milliseconds here, to which tokio jumps.
+/// Tokio itself reads clocks of the standard library, also where tokio drops a task that is woken. Packets arrive at whole milliseconds here, to which tokio
+/// jumps.
 #[test]
 fn clocks_of_the_standard_library_wake_nothing() {
     assert_eq!(took("delay 20ms", None, "clocks random"), took("delay 20ms", None, ""));
@@ -102,4 +103,23 @@ fn a_failure_names_its_seed() {
 #[tokio::test]
 async fn fails() {
     assert!(std::env::var_os("COHAPTIC_TEST_RUNS").is_none());
+}
+
+#[test]
+fn a_socket_before_block_on_is_refused() {
+    let output = run("loopback::before_block_on", &[("COHAPTIC_TEST_LOOPBACK", "delay 20ms")]);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && text.contains("a socket is made outside of `block_on`"), "{text}");
+}
+
+/// Fails when [`a_socket_before_block_on_is_refused`] runs it. On the real loopback the socket is made.
+#[test]
+fn before_block_on() {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    let _entered = runtime.enter();
+    let socket = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    socket.set_nonblocking(true).unwrap();
+    if let Err(error) = tokio::net::UdpSocket::from_std(socket) {
+        panic!("{error}");
+    }
 }

@@ -79,15 +79,25 @@ fn no_devices() -> std::io::Error {
 ///
 /// # Errors
 ///
-/// On a thread that works for a host of a test bed: the sockets of a test bed belong to the thread of the run.
+/// On a thread that works for a host of a test bed: the sockets of a test bed belong to the thread of the run. Under `Runtime::enter`, if the environment asks
+/// for a loopback: the test bed runs within `block_on` only, and the runtime has no real sockets.
 #[cfg(feature = "net")]
 fn bed() -> std::io::Result<Option<std::sync::Arc<dyn cohaptic_sockets::Bed>>> {
     let bed = cohaptic_sockets::bed();
-    if bed.is_none() && cohaptic_sockets::host().is_some() {
-        return Err(std::io::Error::new(
-            std::io::ErrorKind::Unsupported,
-            "a function of `spawn_blocking` makes a socket: the sockets of a test bed belong to the thread that runs it. Make the socket in a task",
-        ));
+    if bed.is_some() {
+        return Ok(bed);
     }
-    Ok(bed)
+    let refused = |text| Err(std::io::Error::new(std::io::ErrorKind::Unsupported, text));
+    if cohaptic_sockets::host().is_some() {
+        return refused(
+            "a function of `spawn_blocking` makes a socket: the sockets of a test bed belong to the thread that runs it. Make the socket in a task",
+        );
+    }
+    #[cfg(feature = "rt")]
+    if real::runtime::Handle::try_current().is_ok() && loopback::loopback::Loopback::of_environment().is_some() {
+        return refused(
+            "a socket is made outside of `block_on`: the loopback of COHAPTIC_TEST_LOOPBACK exists within `block_on`. Make the socket there",
+        );
+    }
+    Ok(None)
 }
