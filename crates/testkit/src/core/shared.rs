@@ -104,8 +104,8 @@ impl Shared {
         self.face.addresses(name).map(|addresses| (addresses, self.six_first))
     }
 
-    /// Returns the time of the run without letting time pass. Nothing is woken: tokio itself reads a clock of the standard library between a poll and its driver,
-    /// when tokio drops a task that is woken.
+    /// Returns the time of the run without letting time pass, so that no task is woken: tokio itself reads a clock of the standard library between a poll and
+    /// its driver, when tokio drops a task that is woken.
     #[cfg(feature = "facade")]
     pub(crate) fn any_now(&self) -> Instant {
         self.ahead().unwrap_or_else(|| self.face.now())
