@@ -11,8 +11,8 @@ from itertools import combinations
 
 from suites import CUT, IDEAL, LOOPBACKS
 
-# Runs on the real loopback without load, and programs that only compute beside the runs with load.
-REAL, BURNERS = 3, 4
+# Programs that only compute beside the runs with load.
+BURNERS = 4
 # Longest time of a program of tests [s].
 PATIENCE = 300
 
@@ -32,7 +32,7 @@ class Runs:
         self.suite, self.folder, self.programs = suite, folder, programs
         self.file, self.log = (work / f"{suite.name}-{suite.version}{end}" for end in (".json", ".log"))
         self.kept = json.loads(self.file.read_text()) if self.file.exists() else {"runs": {}, "smallest": {}}
-        tests = {target: self.names(program) - self.names(program, "--ignored") for target, program in programs["real"].items()}
+        tests = {target: self.names(program) - self.names(program, "--ignored") for target, program in programs["real"].items() if target not in suite.skipped}
         self.tests = {target: names for target, names in tests.items() if names}
 
     def names(self, program, *arguments):
@@ -95,9 +95,9 @@ class Runs:
 
     def figures(self, seeds, loads):
         """Makes all runs that are not kept, and returns what the page shows."""
-        real = [self.real(number) for number in range(REAL)]
+        seeds, loads = min(seeds, self.suite.seeds), min(loads, self.suite.loads)
+        real = [self.real(number) for number in range(self.suite.reals)]
         beds = {words: [self.bed(words, seed) for seed in range(seeds)] for words in LOOPBACKS}
-        loads = min(loads, self.suite.loads)
         # Loopbacks take turns, and then seeds.
         turns = [(LOOPBACKS[number % len(LOOPBACKS)], number // len(LOOPBACKS) % seeds) for number in range(loads)]
         with load():
