@@ -322,6 +322,15 @@ impl fmt::Debug for PeerSpec {
     }
 }
 
+impl PeerSpec {
+    /// Returns the exchanges of the peer with a device in a hand. Readings of an Inverse3 are an exchange old by themselves, so that the peer must not delay
+    /// such readings once more.
+    #[must_use]
+    pub const fn exchange_in_hand(&self) -> Exchange {
+        Exchange { late: self.exchange.late && !matches!(self.kind, PeerKind::Inverse3(..)), ..self.exchange }
+    }
+}
+
 /// Place where a peer runs in a live session (`cohaptic live`). In virtual time every peer is simulated, whatever the kind.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub enum PeerKind {

@@ -147,6 +147,9 @@ impl JoinedPeer {
         let object = ObjectCopy::new(scene.copy_config(place), scene.initial_state(place), scene.integrator, &clock);
         let held = Held::new((0..scene.peers.len()).filter(|other| *other != place).map(|other| scene.initial_state(other)));
         let mut peer = Peer::new(scene.peer_config(place), device, object, FromScene.strategy(&scene, place), held);
+        if in_hand {
+            peer.set_exchange(spec.exchange_in_hand());
+        }
         if let Some(rotation) = scene.rotation_of(place) {
             peer = peer.with_rotation(rotation);
         }

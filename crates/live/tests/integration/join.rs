@@ -21,12 +21,12 @@ const SCENE: &str = "scene = { title = \"two\", duration = \"3s\", seed = 7 }\no
     peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 }, silence = { fade = \"1ns\" } }\n\
     peers = [{ name = \"left\", hand = { force = 1.5 } }, { name = \"right\" }]\nlink = { delay = \"24.5ms\" }\n";
 
-fn scene(overrides: &[&str]) -> Scene {
+pub(crate) fn scene(overrides: &[&str]) -> Scene {
     let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
     Scene::parse_live(SCENE, Path::new("two.toml"), &overrides).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn config(key: Option<SessionKey>) -> JoinedConfig {
+pub(crate) fn config(key: Option<SessionKey>) -> JoinedConfig {
     JoinedConfig { key, scene: 7, label: Label::new("test").unwrap() }
 }
 
@@ -203,6 +203,78 @@ fn a_silent_session_and_a_device_that_is_not_there_end_the_force_at_once() {
     assert_eq!(peer.status(at(2_050_000)).silences, 1);
 }
 
+/// FC is the weight times KC·(xH − xO) + BC·(vH − vO), with 3500 N/m and 5 N·s/m.
+#[test]
+fn the_coupling_rises_over_the_fade_and_is_zero_without_device_or_session() {
+    let expect = |peer: &mut JoinedPeer, millis: u64, expected: f64| {
+        let mut weight = f64::NAN;
+        pass(peer, at(millis * 1000), &mut |row| {
+            let ([xh, vh, xo, vo, ..], force) = (numbers(row), row.coupling_force[0]);
+            weight = force / (3500.0 * (xh - xo) + 5.0 * (vh - vo));
+        });
+        assert!((weight - expected).abs() < 1e-9, "{weight} in place of {expected} at {millis} ms");
+    };
+    let shared = std::sync::Arc::new(std::sync::Mutex::new((true, 0.0)));
+    let there = |is_there: bool| shared.lock().unwrap().0 = is_there;
+    let quick = ["peers.left.kind=falcon", "peers.left.silence.fade=100ms"];
+    let mut held = peer(&quick, None, Some(Box::new(There(shared.clone(), Stopper::default()))));
+    for (millis, weight) in [(0, 0.0), (50, 0.5), (100, 1.0), (150, 1.0)] {
+        expect(&mut held, millis, weight);
+    }
+    there(false);
+    expect(&mut held, 151, 0.0);
+    expect(&mut held, 299, 0.0);
+    there(true);
+    for (millis, weight) in [(300, 0.0), (350, 0.5), (999, 1.0), (1000, 0.0)] {
+        expect(&mut held, millis, weight);
+    }
+    let mut simulated = peer(&[], None, None);
+    expect(&mut simulated, 999, 1.0);
+    expect(&mut simulated, 1000, 0.0);
+}
+
+/// Device that has moved by a micrometre more at each reading.
+struct Moving(u32);
+
+impl Device for Moving {
+    fn description(&self) -> Description {
+        Description { name: "moving".to_owned(), motions: 3, force: 20.0, period: Duration::from_millis(1) }
+    }
+
+    fn stopper(&self) -> Stopper {
+        Stopper::default()
+    }
+
+    fn read(&mut self, _now: Instant) -> Option<Reading> {
+        self.0 += 1;
+        Some(Reading { position: [f64::from(self.0) * 1e-6, 0.0, 0.0], velocity: [0.0; 3] })
+    }
+
+    fn hold(&mut self, _now: Instant, _span: Duration, _force: GatedForce) {}
+}
+
+/// Readings of an Inverse3 are an exchange old by themselves. As in a session, a joined peer uses a reading at once, and at exchanges alone.
+#[test]
+fn readings_of_an_inverse3_are_not_delayed_once_more() {
+    let coupling = "peer.coupling={ stiffness = 1000.0, damping = 0.0 }";
+    for (kind, every, delay) in [("inverse3", 1, 0), ("inverse3", 4, 0), ("falcon", 1, 0), ("falcon", 4, 4)] {
+        let age = u8::from(kind == "inverse3" || delay > 0);
+        let device = format!("peers.left.device={{ mass = 0.1, exchange-every = {every}, exchange-age = {age} }}");
+        let kind_key = format!("peers.left.kind={kind}");
+        let mut peer = peer(&[coupling, &kind_key, &device, "peers.left.silence.fade=1ns"], None, Some(Box::new(Moving(0))));
+        let mut tick = 0;
+        pass(&mut peer, at(40_000), &mut |row| {
+            // The reading of tick k is k + 1 micrometres. At tick 0 the coupling begins to rise.
+            let exchange = f64::from(tick / every * every) - f64::from(delay);
+            let expected = 1000.0 * ((exchange + 1.0).max(0.0) * 1e-6 - row.object.position[0]);
+            let found = row.coupling_force[0];
+            assert!(tick == 0 || (found - expected).abs() < 1e-9, "{kind} {every}: {found} in place of {expected} at tick {tick}");
+            tick += 1;
+        });
+        assert_eq!(tick, 41);
+    }
+}
+
 #[test]
 fn a_stop_and_a_panic_end_the_force_for_good() {
     let begun = || {
@@ -222,6 +294,89 @@ fn a_stop_and_a_panic_end_the_force_for_good() {
     let (mut panics, _, stopper) = begun();
     let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(move || pass(&mut panics, at(600_000), &mut |_| panic!("in a tick"))));
     assert!(panicked.is_err() && stopper.is_stopped());
+}
+
+/// A hello that is sent twice is welcomed twice, and a session that is started again counts its samples from 0.
+#[test]
+fn a_second_welcome_keeps_tick_0_and_samples_count_anew_after_a_restart_of_the_session() {
+    let mut left = peer(&[], None, None);
+    let sample = |sequence: u64, position: f64| {
+        let state = State { position: [position], velocity: [0.0] };
+        crate::support::encode(&wire::Sample { session: 7, sender: 1, sequence, sent: Instant::ZERO, state })
+    };
+    let target = |left: &mut JoinedPeer, millis: u64| {
+        let mut target = f64::NAN;
+        pass(left, at(millis * 1000), &mut |row| target = row.target.position[0]);
+        target
+    };
+    pass(&mut left, at(0), &mut |_| ());
+    left.handle_datagram(at(500), &sample(1000, 0.01));
+    assert_eq!(target(&mut left, 2), 0.01);
+    // The session is silent for a second, and begins anew.
+    target(&mut left, 1500);
+    left.handle_datagram(at(1_500_500), &sample(0, 0.02));
+    assert_eq!(target(&mut left, 1502), 0.02);
+    left.handle_datagram(at(1_502_500), &sample(1, 0.03));
+    assert_eq!((target(&mut left, 1504), left.senders()[1].taken, left.senders()[1].lost()), (0.03, 3, 0));
+
+    let seats = vec![Seat { place: Place(0), name: "left".to_owned(), tick: Duration::from_millis(1) }];
+    let other = AdmissionConfig::new(7, 1, 2, Duration::from_millis(8), seats).with_key(Some(key()));
+    let mut door = AdmissionControl::new(other, &mut Counting::default()).unwrap();
+    let mut keyed = peer(&[], Some(key()), None);
+    let hellos = pass(&mut keyed, at(0), &mut |_| ());
+    for micros in [30_000, 40_000] {
+        let Admission::Reply { bytes, .. } = door.handle_datagram(at(micros), address(1), &hellos[0]) else { panic!("no welcome") };
+        keyed.handle_datagram(at(micros), &bytes);
+    }
+    assert_eq!(keyed.began(), Some(at(30_000)));
+}
+
+/// A tick that is made late is made with the samples that had come when the tick was due.
+#[test]
+fn a_late_tick_takes_the_samples_of_its_instant() {
+    let mut left = peer(&[], None, None);
+    let state = State { position: [0.01], velocity: [0.0] };
+    let sample = crate::support::encode(&wire::Sample { session: 7, sender: 1, sequence: 0, sent: Instant::ZERO, state });
+    pass(&mut left, at(1000), &mut |_| ());
+    left.handle_datagram(at(2500), &sample);
+    let mut targets = Vec::new();
+    for _ in 0..3 {
+        left.handle_timeout(at(4700), &mut Counting::default(), &mut |_, row| targets.push(row.target.position[0])).unwrap();
+    }
+    assert_eq!(targets, [0.0, 0.01, 0.01]);
+}
+
+/// Device with a reading.
+struct Reads(Reading);
+
+impl Device for Reads {
+    fn description(&self) -> Description {
+        Description { name: "reads".to_owned(), motions: 3, force: 20.0, period: Duration::from_millis(1) }
+    }
+
+    fn stopper(&self) -> Stopper {
+        Stopper::default()
+    }
+
+    fn read(&mut self, _now: Instant) -> Option<Reading> {
+        Some(self.0)
+    }
+
+    fn hold(&mut self, _now: Instant, _span: Duration, _force: GatedForce) {}
+}
+
+#[test]
+fn a_reading_counts_along_the_axes_of_the_scene_if_it_is_finite() {
+    let status = |position: [f64; 3]| {
+        let device = Reads(Reading { position, velocity: [0.0; 3] });
+        let mut peer = peer(&["peers.left.kind=falcon"], None, Some(Box::new(device)));
+        pass(&mut peer, at(10_000), &mut |_| ());
+        let status = peer.status(at(10_000));
+        (status.is_device_there, status.device.position)
+    };
+    assert_eq!(status([0.01, 0.02, 0.03]), (true, [0.01, 0.0, 0.0]));
+    assert_eq!(status([0.01, f64::NAN, 0.0]), (true, [0.01, 0.0, 0.0]));
+    assert_eq!(status([f64::NAN, 0.0, 0.0]), (false, [0.0; 3]));
 }
 
 /// The other peer is elsewhere, too: before its first sample and after its silence it has no pull, and its pull rises and falls over its fade.

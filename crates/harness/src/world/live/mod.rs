@@ -9,7 +9,7 @@ mod seat;
 
 use cohaptic_peer::rotation::Attitude;
 use cohaptic_peer::wire::{Extra, MAX_LEN, Sample, SampleKind};
-use cohaptic_peer::{Clock, Device, Exchange, Peer, ReceiveError, Reception, SimulatedDevice, State, Strategy};
+use cohaptic_peer::{Clock, Device, Peer, ReceiveError, Reception, SimulatedDevice, State, Strategy};
 use cohaptic_scene::{PeerKind, Scene};
 use cohaptic_units::Instant;
 use cohaptic_wan::{LinkModel, LinkStats, NodeId, PacketEvent, Path};
@@ -62,10 +62,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
                     self.latest[place] = [f64::NAN; A];
                 }
                 PeerKind::Falcon(..) | PeerKind::Inverse3(..) => {
-                    if matches!(peer.kind, PeerKind::Inverse3(..)) {
-                        // Readings of the device itself are an exchange old: the peer must not delay them once more.
-                        member.peer.set_exchange(Exchange { late: false, ..peer.exchange });
-                    }
+                    member.peer.set_exchange(peer.exchange_in_hand());
                     let state = member.peer.device().state();
                     let hand = Box::new(HandDevice::new(device(), state));
                     *member.peer.device_mut() = DeviceModel::Unsimulated(UnsimulatedDevice::InHand(hand));
