@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use cohaptic_harness::measures::MeasuredValue;
 use cohaptic_harness::{AccessSummary, LinkQuantiles, PeerSummary, Summary};
+use cohaptic_peer::rotation::Attitude;
 use cohaptic_scene::Scene;
 use cohaptic_stability::VerdictKind;
 use cohaptic_wan::{CrossCounts, DropCause, LinkStats};
@@ -32,14 +33,22 @@ enum Components {
     More(Vec<f64>),
 }
 
+/// Returns the keys of a motion: position \[m\] and velocity \[m/s\] along each axis of the scene, and the attitude of an object that turns.
+pub fn motion(position: &[f64], velocity: &[f64], attitude: Option<Attitude>) -> impl Serialize + use<> {
+    document! {
+        position_m: Components::new(position),
+        velocity_m_s: Components::new(velocity),
+        #[serde(flatten)]
+        attitude: attitude.map(|attitude| document! { orientation: attitude.orientation, angular_velocity_rad_s: attitude.rate }),
+    }
+}
+
 /// Returns the document of a peer at the end of a run.
 pub fn peer(peer: &PeerSummary) -> impl Serialize {
     document! {
         name: peer.name.as_str(),
-        position_m: Components::new(&peer.position),
-        velocity_m_s: Components::new(&peer.velocity),
         #[serde(flatten)]
-        attitude: peer.attitude.map(|attitude| document! { orientation: attitude.orientation, angular_velocity_rad_s: attitude.rate }),
+        copy: motion(&peer.position, &peer.velocity, peer.attitude),
         stale_samples: peer.stale_samples,
         refused_samples: peer.refused_samples,
     }

@@ -31,6 +31,7 @@ impl DocumentSchema {
     pub(crate) const STABILITY_SWITCHING_CERTIFICATE: Self = Self { name: "cohaptic/stability-switching-certificate", version: 1 };
     pub(crate) const ADMITTANCE: Self = Self { name: "cohaptic/admittance", version: 1 };
     pub(crate) const LIVE: Self = Self { name: "cohaptic/live", version: 1 };
+    pub(crate) const JOIN: Self = Self { name: "cohaptic/join", version: 1 };
     pub(crate) const RELAY: Self = Self { name: "cohaptic/relay", version: 1 };
     pub(crate) const RELAY_TCP: Self = Self { name: "cohaptic/relay-tcp", version: 1 };
     pub(crate) const ROUTER: Self = Self { name: "cohaptic/router", version: 1 };

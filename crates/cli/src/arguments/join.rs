@@ -21,6 +21,9 @@ pub(crate) struct JoinArguments {
     pub(crate) scene: PathBuf,
     #[command(flatten)]
     pub(crate) overrides: Overrides,
+    /// Print one JSON document and nothing else
+    #[arg(long)]
+    pub(crate) json: bool,
     /// Peer of the scene that is at this computer; its kind in the scene is udp
     #[arg(long, value_name = "NAME")]
     pub(crate) peer: String,

@@ -1,6 +1,7 @@
 //! `cohaptic join`: one peer of a live session at another computer, with its device here.
 
-mod report;
+mod answer;
+mod joined;
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -16,6 +17,7 @@ use cohaptic_live::{Label, SessionKey};
 use cohaptic_scene::{PeerKind, Scene};
 
 use crate::arguments::{JoinArguments, JoinDevice};
+use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::file::own_folder;
 use crate::live::exchanges::DeviceFacts;
@@ -23,7 +25,7 @@ use crate::live::{devices, exchanges};
 use crate::progress::Progress;
 use crate::realtime::{say, some_length};
 use crate::{input, interrupt, output};
-use report::Joined;
+use joined::Joined;
 
 /// Joins a session with one peer, and prints a report at the end.
 pub(crate) fn join(arguments: &JoinArguments) -> Result<ExitCode, Failure> {
@@ -63,9 +65,10 @@ pub(crate) fn join(arguments: &JoinArguments) -> Result<ExitCode, Failure> {
     if !joined.was_heard(&report.status) && !interrupt::requested() {
         return Err(Failure::System(joined.reasons(&report.status)));
     }
-    output::text(&report::describe(&joined, &report, &devices))?;
-    output::wrote(&report.files);
-    Ok(if interrupt::requested() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+    let is_interrupted = interrupt::requested();
+    let document = answer::of(&joined, &report, &devices, is_interrupted);
+    output::answer(arguments.json, DocumentSchema::JOIN, &document, || answer::describe(&joined, &report, &devices), &report.files)?;
+    Ok(if is_interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
 /// Returns the overrides of the scene at this computer. In the scene of the session the peer is elsewhere; here the peer has the kind of its device, and the

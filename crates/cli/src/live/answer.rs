@@ -31,7 +31,7 @@ pub(super) fn of(scene: &Scene, report: &Report, devices: &[DeviceReport]) -> im
             #[serde(flatten)]
             gate: report.gates[place].as_ref().map(|gate| document! { gate: of_gate(gate) }),
             #[serde(flatten)]
-            exchanges: devices.iter().find(|device| device.peer == place).map(|device| document! { exchanges: &device.exchanges }),
+            exchanges: devices.iter().find(|device| device.peer == place).map(DeviceReport::document),
         }
     });
     document! {
@@ -72,7 +72,7 @@ fn of_seat(seat: &SeatStats) -> impl Serialize + use<> {
 }
 
 /// Returns the forces on a hand that the gate of the session changed or made zero.
-fn of_gate(gate: &GateStats) -> impl Serialize + use<> {
+pub(crate) fn of_gate(gate: &GateStats) -> impl Serialize + use<> {
     document! {
         zeroed: gate.causes().map(|(cause, count)| (cause.name(), count)).collect::<BTreeMap<_, _>>(),
         limited: gate.limited,

@@ -4,7 +4,9 @@ use std::time::Duration;
 
 use cohaptic_realtime::{Prepared, Validity};
 use cohaptic_scene::Scene;
+use serde::Serialize;
 
+use crate::document_schema::document;
 #[cfg(feature = "inverse3")]
 use crate::inverse3::Exchanges;
 use crate::realtime;
@@ -33,6 +35,11 @@ pub(crate) struct DeviceReport {
 }
 
 impl DeviceReport {
+    /// Returns the keys of the document of the peer.
+    pub(crate) fn document(&self) -> impl Serialize {
+        document! { exchanges: &self.exchanges, device_error: self.error.as_deref() }
+    }
+
     /// Returns the lines of the report about the device of the peer `name`.
     pub(crate) fn lines(&self, name: &str) -> Vec<String> {
         let errors = self.error.iter().map(|error| format!("ERROR: {error}"));

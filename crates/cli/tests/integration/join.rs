@@ -6,7 +6,7 @@ use std::net::SocketAddr;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::integration::desk::{Desk, parse};
 use crate::integration::router::is_inside;
@@ -133,7 +133,7 @@ fn with_the_key_it_takes_part_and_after_a_loss_of_power_it_joins_again() {
 
 #[cfg(feature = "inverse3")]
 #[test]
-fn an_inverse3_joins_and_the_report_tells_its_exchanges() {
+fn an_inverse3_joins_and_both_answers_tell_its_exchanges() {
     let desk = desk();
     desk.write("lab.toml", LAB.replace("falcon = {", "inverse3 = {"));
     let (session, address) = session(&desk, "");
@@ -147,6 +147,30 @@ fn an_inverse3_joins_and_the_report_tells_its_exchanges() {
     for part in ["with the device inverse3\n", "\n  device of left: ", " exchanges per second, ", "\n  device of left: replies take "] {
         assert!(outcome.stdout.contains(part), "no {part:?} in {}", outcome.stdout);
     }
+
+    let outcome = desk.cohaptic(&format!("{line} --for 500ms --out left --json"));
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    let document = parse(&outcome.stdout);
+    assert_eq!((&document["schema"], &document["title"]), (&json!("cohaptic/join"), &json!("Two computers")), "{document:#}");
+    assert_eq!((&document["session"], &document["ending"]), (&json!(address.to_string()), &json!("complete")), "{document:#}");
+    // Replies may be late on a busy machine, so that the run may be valid or not.
+    assert!(document["valid"].is_boolean(), "{document:#}");
+    assert!(outcome.stderr.contains(&format!("session 7, scene {}\n", document["scene"].as_str().unwrap())), "{}", outcome.stderr);
+    // Every tick has a lateness and a time of the device.
+    let ticks = &document["ticks"];
+    assert!((1..=500).contains(&ticks.as_u64().unwrap()), "{document:#}");
+    assert_eq!([&document["lateness_us"]["count"], &document["device_us"]["count"]], [ticks; 2], "{document:#}");
+    assert_eq!((&document["late_ticks"], document["joinings"].as_u64() >= Some(1)), (&json!(0), true), "{document:#}");
+    let peer = &document["peer"];
+    assert_eq!((&peer["kind"], &peer["name"], &peer["device_error"]), (&json!("inverse3"), &json!("left"), &json!(null)), "{document:#}");
+    assert!(peer["position_m"].is_number() && peer["device"]["position_m"].is_number() && peer["gate"]["zeroed"].is_object(), "{document:#}");
+    assert!(peer["exchanges"]["readings"].as_u64() > Some(0) && peer["exchanges"]["reply_p99_us"].is_number(), "{document:#}");
+    let senders = document["senders"].as_array().unwrap();
+    let counts = |sender: &Value| [&sender["out_of_order"], &sender["lost"]].map(Value::as_u64);
+    assert_eq!((senders.len(), &senders[0]["name"], counts(&senders[0])), (1, &json!("right"), [Some(0); 2]), "{document:#}");
+    assert_eq!((senders[0]["taken"].as_u64() > Some(0), &senders[0]["drift_ppm"]), (true, &json!(null)), "{document:#}");
+    let files: Vec<&str> = document["files"].as_array().unwrap().iter().map(|file| file.as_str().unwrap()).collect();
+    assert_eq!(files, ["left/trajectory.csv", "left/lateness.csv"]);
 }
 
 #[cfg(feature = "inverse3")]
@@ -177,8 +201,8 @@ fn a_wrong_key_scene_place_or_kind_is_a_sentence() {
     join(&format!("{left} --for 300ms --set link.delay=25ms")).assert_refused(3, no_welcome);
     let other = session.said("127.0.0.1:");
     assert!(other.contains(" asked to be left with another scene: ") && other.contains(", and this session's is "), "{other}");
-    // The length of this peer's part is its own, too.
-    let joined = join(&format!("{left} --for 300ms"));
+    // The length of this peer's part is its own, too, and so is the choice of the device.
+    let joined = join(&format!("{left} --for 300ms --set peers.left.falcon.device=first"));
     assert_eq!(joined.status, Some(0), "{}", joined.stderr);
     // A session with a key does not answer a `join` without a key, and the key is among the possible reasons.
     join("--peer left --for 300ms").assert_refused(3, &["nothing from 127.0.0.1:", "it has a key, which --key-file must name here, too"]);
@@ -260,11 +284,16 @@ fn two_computers_with_a_line_between_them_and_a_falcon_at_one_of_them() {
     router.said("between left ");
     let session = right.begin(&desk, &format!("live lab.toml --listen 10.1.0.2:7400 --key-file session.key --json --out session {UNHURRIED}"));
     session.said("listening on 10.1.0.2:7400 for left at place 0");
-    let words = "join 10.1.0.2:7400 lab.toml --peer left --device falcon --key-file session.key --for 3s";
-    let join = left.begin(&desk, &format!("{words} {UNHURRIED}"));
-    join.said("homing the simulated Falcons of left");
-    assert_eq!(join.said("the session at "), "10.1.0.2:7400 takes part with left");
-    let outcome = join.end();
+    let join = || {
+        let words = "join 10.1.0.2:7400 lab.toml --peer left --device falcon --key-file session.key --for 3s";
+        let join = left.begin(&desk, &format!("{words} {UNHURRIED}"));
+        join.said("homing the simulated Falcons of left");
+        assert_eq!(join.said("the session at "), "10.1.0.2:7400 takes part with left");
+        join
+    };
+    // A killed program says nothing. The next one takes its place, from another port.
+    join().kill();
+    let outcome = join().end();
     assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
     for part in ["\n  the run is valid\n", "\n  reading and holding the device took, a tick: p50 "] {
         assert!(outcome.stdout.contains(part), "no {part:?} in {}", outcome.stdout);
@@ -272,9 +301,9 @@ fn two_computers_with_a_line_between_them_and_a_falcon_at_one_of_them() {
     let outcome = session.end_by("-INT");
     let document = parse(&outcome.stdout);
     let seat = &document["peers"][0]["seat"];
-    // Of 375 samples in 3 s the line loses a tenth.
+    // Of 375 samples in 3 s the line loses a tenth. The killed program sent some before.
     let taken = seat["taken"].as_u64().unwrap();
-    assert!((200..=375).contains(&taken) && seat["joined"].as_u64() >= Some(1), "{document:#}");
+    assert!((200..500).contains(&taken) && seat["joined"].as_u64() >= Some(1), "{document:#}");
     // The record of the session is replayed as any other.
     desk.text("run lab.toml --inputs session/inputs.csv --out again");
     assert_eq!(desk.read("session/trajectory.csv"), desk.read("again/trajectory.csv"));

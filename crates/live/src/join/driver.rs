@@ -87,6 +87,8 @@ pub struct JoinReport {
     pub senders: Vec<HeardSender>,
     /// Lateness of the ticks.
     pub ticks: LatenessSummary,
+    /// Ticks later than the tolerance.
+    pub late_ticks: u64,
     /// Verdict on the ticks.
     pub validity: Validity,
     /// Duration of reading and holding the device, per tick; `None` for a simulated device.
@@ -167,7 +169,7 @@ impl Join {
         let clock = MonotonicClock::start();
         let (device, times) = device.map_or((None, None), |device| {
             let times = CallTimes::default();
-            let timed: Box<dyn Device> = Box::new(Timed { device, times: times.clone(), clock, reading: Duration::ZERO });
+            let timed: Box<dyn Device> = Box::new(Timed { device, times: times.clone(), clock, reading: None });
             (Some(timed), Some(times))
         });
         let peer = JoinedPeer::new(scene.clone(), place, config.joined.clone(), device)?;
@@ -215,6 +217,7 @@ impl Join {
             status,
             senders: peer.senders().to_vec(),
             ticks: ticks.summary(),
+            late_ticks: ticks.count_later_than(config.tolerance.limit),
             validity: config.tolerance.judge(&ticks, "ticks"),
             device: device.map(|times| times.summary()),
             gate: peer.gate_stats().copied(),
@@ -326,8 +329,8 @@ struct Timed {
     device: Box<dyn Device>,
     times: CallTimes,
     clock: MonotonicClock,
-    /// Duration of the reading at the present tick.
-    reading: Duration,
+    /// Duration of the reading at the present tick; `None` once the force of the tick is held, so that the zero force of a stop counts as no tick.
+    reading: Option<Duration>,
 }
 
 impl Device for Timed {
@@ -342,14 +345,16 @@ impl Device for Timed {
     fn read(&mut self, now: Instant) -> Option<Reading> {
         let begin = self.clock.now();
         let state = self.device.read(now);
-        self.reading = self.clock.now().saturating_duration_since(begin);
+        self.reading = Some(self.clock.now().saturating_duration_since(begin));
         state
     }
 
     fn hold(&mut self, now: Instant, span: Duration, force: GatedForce) {
         let begin = self.clock.now();
         self.device.hold(now, span, force);
-        self.times.record(self.reading + self.clock.now().saturating_duration_since(begin));
+        if let Some(reading) = self.reading.take() {
+            self.times.record(reading + self.clock.now().saturating_duration_since(begin));
+        }
     }
 
     fn stop(&mut self) {

@@ -6,6 +6,7 @@ use std::time::Duration;
 use cohaptic_harness::live::{GateStats, GatedDevice};
 use cohaptic_harness::{StateRow, TickRow, TurnRow};
 use cohaptic_peer::coordination::BuiltInStrategy;
+use cohaptic_peer::rotation::Attitude;
 use cohaptic_peer::wire::{Extra, MAX_LEN, Sample, SampleKind};
 use cohaptic_peer::{Clock, Gains, Held, LastSent, ObjectCopy, Peer, SendWhen, SimulatedDevice, State};
 use cohaptic_scene::{FromScene, PeerKind, Scene, Strategies};
@@ -395,6 +396,7 @@ impl JoinedPeer {
             silences: self.silences,
             device: cohaptic_peer::Device::state(self.peer.device()),
             object: *self.peer.object().state(),
+            attitude: self.peer.rotation().map(|rotation| *rotation.copy()),
             force: self.peer.applied().coupling,
         }
     }
@@ -441,6 +443,8 @@ pub struct JoinedStatus {
     pub device: State<3>,
     /// State of the copy.
     pub object: State<3>,
+    /// Attitude of the copy; `None` if the object does not turn.
+    pub attitude: Option<Attitude>,
     /// Coupling force FC \[N\]. Acts on the hand with the opposite sign.
     pub force: [f64; 3],
 }

@@ -14,6 +14,7 @@ mod hostile;
 #[cfg(feature = "inverse3")]
 mod inverse3s;
 mod join;
+mod join_sockets;
 mod key_files;
 mod keyed;
 mod keyless;

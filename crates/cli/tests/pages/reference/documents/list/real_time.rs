@@ -2,7 +2,7 @@
 
 use super::Document;
 
-pub(super) const REAL_TIME: [Document; 14] = [
+pub(super) const REAL_TIME: [Document; 15] = [
     Document {
         command: "live",
         lines: &[
@@ -32,11 +32,44 @@ pub(super) const REAL_TIME: [Document; 14] = [
             ),
             ("peers[].gate.limited, peers[].gate.slewed", "ticks at which the force on the hand was shortened, and its change"),
             ("peers[].exchanges.@Exchanges with an Inverse3", "of Inverse3s: what was exchanged with the service"),
+            ("peers[].device_error", "of Inverse3s: the obstacle, or `null`"),
             ("link_totals.NAME, link_quantiles.NAME, links[].from, links[].to, links[].@Counters, access_lines", "as of a run"),
             ("door.address, door.handled", "with other programs: where it listens; `handled` = `admitted` + `welcomed` + all of `refused`"),
             ("door.admitted, door.welcomed, door.refused.NAME", "datagrams; refused ones [by cause](live-protocol.md#why-a-datagram-is-refused)"),
             ("door.joinings, door.sent, door.nobody_there, door.send_failures.NAME, door.oversized, door.kernel_drops", "what else was counted"),
             ("granted, refused_wishes", "what the system granted and refused"),
+        ],
+    },
+    Document {
+        command: "join",
+        lines: &[
+            "sed 's/kind = \"udp\"/&\\ninverse3 = { device = \"simulated\" }/' scenarios/live/two-and-a-program.toml > scene.toml && \
+             python3 programs/joined.py scene.toml --peer third --device inverse3 --for 300ms --out out --json",
+            "python3 programs/joined.py scenarios/rigid/tray.toml --set peers.north-east.kind=udp --peer north-east --device simulated --for 100ms --json",
+        ],
+        rows: &[
+            ("title, session, scene", "of the scene; the address of the session; the [fingerprint](live-protocol.md#layouts) of the scene"),
+            ("duration_s, ending", "time since tick 0; `complete` (`--for`) or `interrupted`"),
+            ("valid, ticks, late_ticks, lateness_us.@Lateness", "as [of a session](#live), of the ticks of this peer"),
+            ("device_us.@Lateness", "of a device in a hand: time of reading and holding, per tick"),
+            ("peer.kind, peer.name", "`falcon`, `inverse3` or `simulated`; which peer"),
+            (
+                "peer.position_m, peer.velocity_m_s, peer.orientation, peer.angular_velocity_rad_s",
+                "of the copy at the end, as of a run; without `orientation` where the object does not turn",
+            ),
+            ("peer.device.position_m, peer.device.velocity_m_s", "of the device at the end"),
+            (
+                "peer.gate.zeroed.NAME, peer.gate.limited, peer.gate.slewed, peer.exchanges.@Exchanges with an Inverse3, peer.device_error",
+                "as of a peer of a session",
+            ),
+            ("sent, joinings, silences", "samples sent; with a key, welcomes taken; silences of the session of a second or more"),
+            (
+                "senders[].name, senders[].taken, senders[].out_of_order, senders[].lost",
+                "samples of the other peers: new, received after a later one or twice, lost on the way",
+            ),
+            ("senders[].drift_ppm", "by how much the clock here is faster than that of the sender; `null` before two windows of 10 s"),
+            ("send_failures.NAME, oversized", "datagrams lost at the socket, as of `door`"),
+            ("granted, refused_wishes, files", "what the system granted and refused; what was written"),
         ],
     },
     Document {

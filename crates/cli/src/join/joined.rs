@@ -1,17 +1,12 @@
-//! Words of `cohaptic join`: the line of status, the reasons for no welcome, and the report at the end.
+//! Peer at this computer and its session, with the words during a run: the line of status, and the reasons for no welcome.
 
-use std::fmt::Write as _;
 use std::net::SocketAddr;
 
-use cohaptic_live::join::{DRIFT_WINDOW, HeardSender, JoinReport, JoinedStatus};
+use cohaptic_live::join::JoinedStatus;
 use cohaptic_scene::{Fingerprint, Scene};
-use cohaptic_units::print::{Counted, Span};
+use cohaptic_units::print::Span;
 
 use crate::arguments::JoinDevice;
-use crate::live::answer::without_force;
-use crate::live::exchanges::{DeviceReport, notes};
-use crate::realtime::late;
-use crate::run::answer::length;
 
 /// Peer at this computer, and its session.
 pub(super) struct Joined<'a> {
@@ -66,50 +61,5 @@ impl Joined<'_> {
         } else {
             format!("nothing from {session} yet. Possible reasons: {everywhere}; it has a key, which --key-file must name here, too; {seat}")
         }
-    }
-}
-
-/// Returns the report.
-pub(super) fn describe(joined: &Joined<'_>, report: &JoinReport, devices: &[DeviceReport]) -> String {
-    let Joined { scene, place, session, device, .. } = joined;
-    let status = &report.status;
-    let name = &scene.peers[*place].name;
-    let mut text = format!("{}: {name} at {session}, with the device {}\n", scene.title, device.kind());
-    let mut line = |line: String| {
-        let _ = writeln!(text, "  {line}");
-    };
-    line(format!("{}, {}", Span::measured(status.elapsed), Counted(status.ticks, "tick")));
-    line(format!("the run is {}", report.validity));
-    line(format!("lateness of ticks: {}", late(&report.ticks)));
-    if let Some(device) = &report.device {
-        line(format!("reading and holding the device took, a tick: {}", late(device)));
-    }
-    devices.iter().flat_map(|device| device.lines(name)).for_each(&mut line);
-    report.gate.iter().filter_map(|gate| without_force(name, gate)).for_each(&mut line);
-    let joinings = if joined.is_keyed { format!(" in {}", Counted(status.joinings, "joining")) } else { String::new() };
-    line(format!("{} sent{joinings}", Counted(status.sent, "sample")));
-    for (peer, sender) in scene.peers.iter().zip(&report.senders).enumerate().filter(|(other, _)| other != place).map(|(_, heard)| heard) {
-        line(format!("{}: {}", peer.name, heard(sender)));
-    }
-    if status.silences > 0 {
-        line(format!("the session was silent for a second or more {}", Counted(status.silences, "time")));
-    }
-    let axes = scene.axes.count();
-    let position = |position: &[f64; 3]| position[..axes].iter().map(|x| length(*x)).collect::<Vec<_>>().join(", ");
-    line(format!("{name} ends at {}, its device at {}", position(&status.object.position), position(&status.device.position)));
-    let lost = report.socket.failures.in_all() + report.socket.oversized;
-    if lost > 0 {
-        line(format!("lost at the socket: {}", Counted(lost, "datagram")));
-    }
-    text.push_str(&notes(&report.prepared, report.validity));
-    text
-}
-
-fn heard(sender: &HeardSender) -> String {
-    let lost = sender.lost();
-    let came = format!("{} taken, {} late, {lost} of {} lost", Counted(sender.taken, "sample"), sender.late, sender.taken + sender.late + lost);
-    match sender.drift.ppm() {
-        Some(ppm) => format!("{came}; the clock here is {:.1} ppm {}", ppm.abs(), if ppm < 0.0 { "slower" } else { "faster" }),
-        None => format!("{came}; drift not known before {}", Span(2 * DRIFT_WINDOW)),
     }
 }
