@@ -58,7 +58,7 @@ fn a_pipe_takes_what_a_file_would_hold_and_stays_a_pipe() {
         assert!(fs::symlink_metadata(desk.path("pipe")).unwrap().file_type().is_fifo(), "{line}");
         if line.starts_with("live") {
             // A key is never written over anything.
-            outcome.assert_refused(3, &["cannot make the key file pipe"]);
+            outcome.assert_refused(3, &["the key file pipe exists already and is never replaced"]);
             assert_eq!(bytes, b"");
             continue;
         }

@@ -77,7 +77,13 @@ pub enum KeyFileError {
         /// Path of the key file.
         path: PathBuf,
     },
-    /// The file cannot be created or written. An existing file is never replaced.
+    /// The file exists already. A key is never replaced.
+    #[error("the key file {} exists already and is never replaced: use this key, or name another file", path.display())]
+    Exists {
+        /// Path of the key file.
+        path: PathBuf,
+    },
+    /// The file cannot be created or written.
     #[error("cannot make the key file {}: {source}", path.display())]
     Write {
         /// Path of the key file.
@@ -132,7 +138,10 @@ impl SessionKey {
             file.write_all(text.as_bytes())?;
             file.sync_all()
         };
-        write().map_err(|source| KeyFileError::Write { path: path.to_owned(), source })?;
+        write().map_err(|source| {
+            let path = path.to_owned();
+            if source.kind() == io::ErrorKind::AlreadyExists { KeyFileError::Exists { path } } else { KeyFileError::Write { path, source } }
+        })?;
         Ok(key)
     }
 }

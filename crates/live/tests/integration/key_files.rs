@@ -27,7 +27,7 @@ fn a_new_key_file_is_its_owners_alone_and_reads_back() {
         assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
     }
     let again = SessionKey::generate_to(&path, &mut Counting::default()).unwrap_err();
-    assert!(matches!(again, KeyFileError::Write { .. }), "a key is never replaced: {again}");
+    assert!(matches!(again, KeyFileError::Exists { .. }) && again.to_string().contains("use this key, or name another file"), "{again}");
     assert_eq!(fs::read_to_string(&path).unwrap(), text);
 }
 
