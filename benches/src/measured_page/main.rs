@@ -85,7 +85,7 @@ fn read(file: &Path) -> Result<Page, String> {
 /// Measures, and writes docs/measured.md and the pages beside it.
 ///
 /// Each step is on the page as soon as it is done, with its own date; steps that are not named keep what the page says of them. A step that fails changes
-/// nothing. Pages of figures that need a quiet machine and privileges are not written: measured-relay.md, measured-live.md, measured-floods.md, measured-tcp.md, measured-soak.md, measured-first.md and measured-fuzz.md name their own commands.
+/// nothing. Pages of figures that need a quiet machine and privileges are not written: measured-relay.md, measured-live.md, measured-devices.md, measured-floods.md, measured-tcp.md, measured-soak.md, measured-first.md and measured-fuzz.md name their own commands.
 #[derive(Debug, Parser)]
 #[command(name = "benches/measure", version)]
 pub(crate) struct Arguments {

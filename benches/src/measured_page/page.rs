@@ -27,7 +27,7 @@ const NOT_YET: &str = "Not measured yet:";
 const OTHERS: &str = "## Written by other commands";
 
 /// Pages that need a quiet machine or privileges: what they say, and what writes them.
-const ALONE: [(&str, &str, &str); 9] = [
+const ALONE: [(&str, &str, &str); 10] = [
     (
         "measured-relay.md",
         "how late the relay and how fast",
@@ -37,6 +37,11 @@ const ALONE: [(&str, &str, &str); 9] = [
         "measured-live.md",
         "how late the ticks of a live session, and what they cost",
         "cargo run --profile dist -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md",
+    ),
+    (
+        "measured-devices.md",
+        "how late a session with devices and a peer at another computer, and how long exchanges with devices take",
+        "benches/devices > docs/measured-devices.md",
     ),
     (
         "measured-floods.md",

@@ -8,6 +8,7 @@
 //! | `cohaptic-accuracy` | run by `crates/accuracy/tests/integration/program.rs`, which is where that program can be had. Its whole line is known |
 //! | of `benches/realtime` | not run here: they wait by the wall clock, for an hour even. Package, program and arguments are looked up |
 //! | the ignored test of `crates/cli/tests/cluster` | not run here: it takes minutes, and schedulers. Its text is known |
+//! | `benches/devices` | makes its page from the reports on the page. `crates/cli/tests/integration/measured.rs` runs it, which is where that program can be had |
 //! | `benches/first-result` | not run here: it compiles the project several times, and downloads. Its rows are looked up |
 //! | `fuzz/run` | not run here: `.ci/nightly` runs it. Its targets are looked up |
 //! | of `benches/peers` | not run here: a workspace of its own with the crates of others, which CI does not build. Folder, programs and scripts are looked up |
@@ -33,8 +34,8 @@ enum Kind {
     Accuracy,
     /// Programs of another package, by folder and name.
     Elsewhere(&'static str, Vec<String>),
-    /// A script that measures how long users wait, for a first result or for a build.
-    Waiting,
+    /// A script of its own: how long users wait for a first result or for a build, and a session with devices.
+    Alone,
     /// The script that runs the fuzz targets.
     Fuzz,
     /// An ignored test of the command line, which is where the program and schedulers can be had.
@@ -46,8 +47,13 @@ fn kind(command: &str) -> Option<Kind> {
     if command == "benches/measure" {
         return Some(Kind::Script);
     }
-    if ["benches/first-result > docs/measured-first.md", "benches/build-times > docs/measured-build.md"].contains(&command) {
-        return Some(Kind::Waiting);
+    let alone = [
+        "benches/first-result > docs/measured-first.md",
+        "benches/build-times > docs/measured-build.md",
+        "benches/devices > docs/measured-devices.md",
+    ];
+    if alone.contains(&command) {
+        return Some(Kind::Alone);
     }
     if command == "fuzz/run --runs 10000000 --page" {
         return Some(Kind::Fuzz);
@@ -149,7 +155,7 @@ fn every_program_that_writes_a_page_has_its_command_on_one() {
                 // That the script starts this program is tested in script.rs.
                 Kind::Script => program == "measured-page",
                 Kind::Elsewhere(of, others) => *of == folder && others.contains(&program),
-                Kind::Cohaptic | Kind::Accuracy | Kind::Waiting | Kind::Fuzz | Kind::IgnoredTest => false,
+                Kind::Cohaptic | Kind::Accuracy | Kind::Alone | Kind::Fuzz | Kind::IgnoredTest => false,
             });
             assert!(found, "{program} of {name} is on no page");
         }
@@ -158,7 +164,7 @@ fn every_program_that_writes_a_page_has_its_command_on_one() {
         let (folder, used) = match kind {
             Kind::Table { program, .. } => ("benches", std::slice::from_ref(program)),
             Kind::Elsewhere(folder, used) => (*folder, &used[..]),
-            Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::Waiting | Kind::Fuzz | Kind::IgnoredTest => continue,
+            Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::Alone | Kind::Fuzz | Kind::IgnoredTest => continue,
         };
         assert!(used.iter().all(|program| programs(folder).contains(program)), "{command}");
     }
@@ -180,6 +186,26 @@ fn the_rows_of_first_result_are_those_of_its_page() {
     for user in ["programmer", "researcher", "laboratory"] {
         assert!(help.contains(user) && shipped.contains(&format!("\n| {user} | ")), "{user}: {help}\n{shipped}");
     }
+}
+
+/// The script makes the page in `docs/` from the reports on the page.
+#[test]
+fn the_page_of_devices_is_that_of_its_reports() {
+    let shipped = std::fs::read_to_string(root().join("docs/measured-devices.md")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let mut blocks = shipped.split("\n```text\n").skip(1).map(|rest| rest.split("\n```\n").next().unwrap());
+    let three = blocks.next().unwrap().split("\n\n").zip(["live.txt", "join.txt", "router.txt"]);
+    let reports: Vec<(&str, &str)> = three.chain(blocks.next().map(|report| (report, "grip.txt"))).collect();
+    assert_eq!(reports.len(), 4, "{shipped}");
+    reports.iter().for_each(|(report, name)| std::fs::write(folder.path().join(name), format!("{report}\n")).unwrap());
+    let output = Command::new(root().join("benches/devices")).arg("--reports").arg(folder.path()).output().unwrap();
+    // `env` ends with this status where there is no Python.
+    if output.status.code() == Some(127) {
+        return;
+    }
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let without_machine = |page: &str| page.lines().filter(|line| !line.starts_with("and measured on ")).collect::<Vec<_>>().join("\n");
+    assert_eq!(without_machine(&String::from_utf8(output.stdout).unwrap()), without_machine(&shipped), "write docs/measured-devices.md anew");
 }
 
 /// The page has a row for each target, and no other.
@@ -216,14 +242,9 @@ pub(crate) fn prints_its_page(path: &str, program: &str) -> (String, String) {
     let all = all();
     let of_program = all.iter().find_map(|(_, _, kind)| match kind {
         Kind::Table { program: of, page, .. } if of == program => Some(page.clone()),
-        Kind::Table { .. }
-        | Kind::Script
-        | Kind::Cohaptic
-        | Kind::Accuracy
-        | Kind::Elsewhere(..)
-        | Kind::Waiting
-        | Kind::Fuzz
-        | Kind::IgnoredTest => None,
+        Kind::Table { .. } | Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::Elsewhere(..) | Kind::Alone | Kind::Fuzz | Kind::IgnoredTest => {
+            None
+        }
     });
     let page = of_program.unwrap_or_else(|| panic!("{program} is on no page"));
     let output = Command::new(path).arg("--smoke").output().unwrap();

@@ -14,7 +14,7 @@ fn root() -> PathBuf {
 }
 
 /// The pages whose every command is looked at.
-const PAGES: [&str; 16] = [
+const PAGES: [&str; 17] = [
     "measured.md",
     "measured-speed.md",
     "measured-cluster.md",
@@ -25,6 +25,7 @@ const PAGES: [&str; 16] = [
     "measured-peers.md",
     "measured-relay.md",
     "measured-live.md",
+    "measured-devices.md",
     "measured-floods.md",
     "measured-tcp.md",
     "measured-soak.md",

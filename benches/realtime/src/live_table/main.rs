@@ -56,6 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("Lateness of the 1 kHz loop of [`cohaptic live`](live.md), and its cost. This page is written by\n");
     println!("    cargo run --profile dist -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md\n");
     println!("and measured on: {}. Each row is a run of {seconds} s, all of them one after the other in one process.\n", machine::name());
+    println!("Ten minutes with three devices, one of them at another computer, are on [a page of their own](measured-devices.md).\n");
     loops(span)?;
     calls_of_devices(span)?;
     at_the_door()

@@ -1,5 +1,6 @@
 //! Every `cohaptic …` command on `docs/measured.md` runs as it stands there, with less work. Its other commands are those of `benches/tests/integration`
 //! and of `crates/accuracy/tests/integration/program.rs`.
+#![expect(clippy::print_stdout, reason = "a test that is skipped says why")]
 
 use std::path::{Path, PathBuf};
 
@@ -30,6 +31,24 @@ fn text(words: &[String]) -> String {
     assert_eq!(outcome.status, Some(0), "{words:?}: {}", outcome.stderr);
     assert!(outcome.stderr.lines().all(|line| line.starts_with("wrote ")), "{words:?}: {}", outcome.stderr);
     outcome.stdout
+}
+
+/// The script of docs/measured-devices.md prints a page of the same form after a short run. What the page says of its reports is tested in `benches`.
+#[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
+fn a_session_with_devices_at_two_computers_becomes_a_page() {
+    let works = |line: &str| Command::new("sh").args(["-c", line]).output().unwrap().status.success();
+    if !works("unshare --map-root-user --net --mount true && test -w /dev/net/tun && ip -V && python3 -V") {
+        println!("skipped: this needs namespaces, /dev/net/tun, ip and python3");
+        return;
+    }
+    let script = root().join("benches/devices");
+    let printed = Outcome::of(Command::new(&script).args(["--seconds", "3", "--program", env!("CARGO_BIN_EXE_cohaptic")]).output().unwrap());
+    assert_eq!(printed.status, Some(0), "{}", printed.stderr);
+    let shipped = std::fs::read_to_string(root().join("docs/measured-devices.md")).unwrap();
+    let form = |page: &str| page.lines().filter(|line| line.starts_with(['#', '|'])).map(|line| line.split(['|', '#']).count()).collect::<Vec<_>>();
+    assert_eq!(form(&printed.stdout), form(&shipped), "{}", printed.stdout);
+    assert!(printed.stdout.contains("All of it is one session of 3s "), "{}", printed.stdout);
 }
 
 #[test]

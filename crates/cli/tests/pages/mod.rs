@@ -183,6 +183,7 @@ fn written_by_a_benchmark(text: &str) -> bool {
     text.contains("written by\n\n    cargo run --profile dist")
         || text.contains("written by\n\n    cd benches/")
         || text.contains("written by\n\n    benches/build-times")
+        || text.contains("written by\n\n    benches/devices")
         || text.contains("written by\n\n    benches/first-result")
         || text.contains("\n\n    benches/measure\n")
 }
