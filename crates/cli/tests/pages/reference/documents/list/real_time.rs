@@ -15,7 +15,10 @@ pub(super) const REAL_TIME: [Document; 15] = [
             ("measures.NAME", "each [measure](#measures) of the scene; of energy, only that of copies that the session simulates"),
             ("title, duration_s, ending, ticks, max_discrepancy_m, files", "as [of a run](#run)"),
             ("task.kind, task.outcome, task.time_s, task.reached_s, task.failed_by, task.reason", "as of a run"),
-            ("valid", "whether at most one in a thousand ticks and datagrams was later than the tolerance"),
+            (
+                "valid",
+                "whether at most one in a thousand ticks and datagrams was later than the tolerance, and at most one in a thousand exchanges with an Inverse3 late",
+            ),
             ("late_ticks", "ticks later than the tolerance"),
             ("lateness_us.@Lateness", "of ticks"),
             ("release_lateness_us.@Lateness", "of datagrams to other programs"),
@@ -50,7 +53,8 @@ pub(super) const REAL_TIME: [Document; 15] = [
         rows: &[
             ("title, session, scene", "of the scene; the address of the session; the [fingerprint](live-protocol.md#layouts) of the scene"),
             ("duration_s, ending", "time since tick 0; `complete` (`--for`) or `interrupted`"),
-            ("valid, ticks, late_ticks, lateness_us.@Lateness", "as [of a session](#live), of the ticks of this peer"),
+            ("valid", "whether at most one in a thousand ticks of this peer, and exchanges with its Inverse3, was late"),
+            ("ticks, late_ticks, lateness_us.@Lateness", "as [of a session](#live), of this peer"),
             ("device_us.@Lateness", "of a device in a hand: time of reading and holding, per tick"),
             ("peer.kind, peer.name", "`falcon`, `inverse3` or `simulated`; which peer"),
             (
