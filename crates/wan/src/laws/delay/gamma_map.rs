@@ -2,15 +2,14 @@
 //!
 //! x(z) is smooth, and its Taylor series at any point follows from one exact inverse: x′ = x·v and v′ = v·(−z + (x − a)·v), where v = φ(z)/(x^a·e^(−x)/Γ(a))
 //! (the idea is Steinbrecher & Shaw's, *Quantile mechanics*, 2008). A cell of width 1/8 has eleven derivatives. A cell has no series if its next two terms
-//! would be visible (small shapes, where x(z) falls off like a power of Φ). In such a cell, and for |z| ≥ 8, the exact inverse is computed. The series of
-//! ln x(z), with (ln x)′ = v, is accurate there too, and gives x(z) to twelve digits, which most [whole delays](super::whole) need.
+//! would be visible (small shapes, where x(z) falls off like a power of Φ). In such a cell, and for |z| ≥ 8, the exact inverse is computed. The omitted terms are
+//! large there only beside x itself, which is far below the mean, and most [whole delays](super::whole) need no more than a small share of the mean.
 
 use alloc::boxed::Box;
 
 use super::LARGEST_NORMAL;
 use super::special::{gamma, gamma_inverse, normal};
 use super::tail::Tail;
-use super::whole::exp_nearly;
 
 /// Half of the range of z: cells cover (−RANGE, RANGE).
 pub(super) const RANGE: f64 = 8.0;
@@ -27,16 +26,16 @@ const TOLERANCE: f64 = 1e-14;
 
 /// Number below which [`GammaMap::nearly`] gives 0: e⁻¹⁰⁰.
 const NOTHING: f64 = 3.7e-44;
-/// Largest sum of the omitted terms of ln x.
-const NEAR: f64 = 1e-13;
+/// Largest sum of the omitted terms of [`GammaMap::nearly`], as a share of the mean of x.
+const NEAR: f64 = 1e-12;
 
 /// Map x(z) of one shape.
 #[derive(Clone, Debug)]
 pub(super) struct GammaMap {
     shape: f64,
     cells: Box<[Cell; CELLS as usize]>,
-    /// Series of ln x(z), with NaN where a series is not accurate. `None` if every cell has a series of x(z).
-    logarithms: Option<Box<[Cell; CELLS as usize]>>,
+    /// Series for [`GammaMap::nearly`], with NaN where a series is not even near. `None` if every cell of `cells` has a series.
+    near: Option<Box<[Cell; CELLS as usize]>>,
 }
 
 /// Taylor coefficients in units of half a cell, or NaN without an accurate series. Array k, for k from 0 to 3, holds the terms k, k + 4 and k + 8, so vector
@@ -49,19 +48,26 @@ impl GammaMap {
     /// Returns the map of one shape, after computing the series of every cell.
     pub(super) fn new(shape: f64) -> Self {
         let centre = |cell: u32| (f64::from(cell) + 0.5) / DENSITY - RANGE;
-        let [mut cells, mut logarithms] = [(); 2].map(|()| Box::new([Cell::NONE; CELLS as usize]));
-        for ((cell, logarithm), number) in cells.iter_mut().zip(logarithms.iter_mut()).zip(0..) {
-            let series = taylor(shape, centre(number));
-            *cell = series.x.map_or(Cell::NONE, |terms| Cell::new(&terms));
-            *logarithm = series.logarithm.map_or(Cell::NONE, |terms| Cell::new(&terms));
-            // In a cell whose right edge has an x near 0, the logarithm of x may be beyond the range of numbers.
+        let [mut cells, mut near] = [(); 2].map(|()| Box::new([Cell::NONE; CELLS as usize]));
+        for ((cell, near), number) in cells.iter_mut().zip(near.iter_mut()).zip(0..) {
+            let (terms, omitted) = taylor(shape, centre(number));
+            let series = Cell::new(&terms);
+            // At t = −1 the increasing series is least, so the bound is relative to the smallest x of the cell. NaN fails both comparisons, so a series with NaN
+            // is refused.
+            if omitted <= TOLERANCE * series.sum(-1.0) {
+                (*cell, *near) = (series, series);
+                continue;
+            }
             let edge = centre(number) + 0.5 / DENSITY;
-            if series.logarithm.is_none() && gamma_inverse::inverse(shape, Tail::of_normal(edge), edge) < NOTHING {
-                *logarithm = Cell::new(&core::array::from_fn(|n| if n == 0 { -1000.0 } else { 0.0 }));
+            // The mean of x is the shape. In a cell whose right edge has an x near 0, derivatives of x may be beyond the range of numbers.
+            if omitted <= NEAR * shape {
+                *near = series;
+            } else if gamma_inverse::inverse(shape, Tail::of_normal(edge), edge) < NOTHING {
+                *near = Cell::new(&[0.0; TERMS]);
             }
         }
         let has_all = cells.iter().all(|cell| !cell.sum(0.0).is_nan());
-        Self { shape, cells, logarithms: (!has_all).then_some(logarithms) }
+        Self { shape, cells, near: (!has_all).then_some(near) }
     }
 
     pub(super) const fn shape(&self) -> f64 {
@@ -75,16 +81,13 @@ impl GammaMap {
         if x.is_nan() { self.exactly(z) } else { x }
     }
 
-    /// Computes x(z) of several numbers with a relative error below 10⁻¹², or as 0 if x(z) is below e⁻¹⁰⁰. NaN without an accurate series.
+    /// Computes x(z) of several numbers with an error below 10⁻¹²·(x(z) + mean of x). NaN without such a series.
     #[inline(always)]
     pub(super) fn nearly<const N: usize>(&self, z: &[f64; N], x: &mut [f64; N]) {
-        // The logarithm has a series in every cell in which x has a series, so that only one sum is needed.
-        let Some(logarithms) = &self.logarithms else {
-            return x.iter_mut().zip(z).for_each(|(x, z)| *x = sum(&self.cells, *z));
-        };
-        x.iter_mut().zip(z).for_each(|(x, z)| *x = sum(logarithms, *z));
-        for x in x {
-            *x = if *x < -100.0 { 0.0 } else { exp_nearly(*x) };
+        let cells = self.near.as_ref().unwrap_or(&self.cells);
+        // A loop instead of `for_each`: the compiler does not inline the fold of a zip, which would then be compiled for narrower registers than the caller's loop.
+        for (x, z) in x.iter_mut().zip(z) {
+            *x = sum(cells, *z);
         }
     }
 
@@ -112,12 +115,6 @@ fn sum(cells: &[Cell; CELLS as usize], z: f64) -> f64 {
         Some(terms) if position >= 0.0 => terms.sum(2.0 * (position - f64::from(cell)) - 1.0),
         Some(_) | None => f64::NAN,
     }
-}
-
-/// Terms of the series of x(z) and of ln x(z) at one point, each `None` if the series is not accurate enough.
-struct Series {
-    x: Option<[f64; TERMS]>,
-    logarithm: Option<[f64; TERMS]>,
 }
 
 impl Cell {
@@ -149,8 +146,8 @@ impl Cell {
     }
 }
 
-/// Returns the series at `z`.
-fn taylor(a: f64, z: f64) -> Series {
+/// Returns the series of x(z) at `z`, and the sum of the omitted terms.
+fn taylor(a: f64, z: f64) -> ([f64; TERMS], f64) {
     const ALL: usize = TERMS + WITNESSES;
     let half = 0.5 / DENSITY;
     let first = gamma_inverse::inverse(a, Tail::of_normal(z), z);
@@ -177,20 +174,5 @@ fn taylor(a: f64, z: f64) -> Series {
         excess[n + 1] = x[n + 1];
         v[n + 1] = half / order * product(&v, &s, n);
     }
-    let omitted = |series: &[f64; ALL]| series[TERMS..].iter().map(|term| term.abs()).sum::<f64>();
-    let kept = |series: &[f64; ALL]| core::array::from_fn(|n| series[n]);
-    let (terms, mut logarithm) = (kept(&x), [0.0; ALL]);
-    logarithm[0] = libm::log(first);
-    let mut order = 0.0;
-    for n in 0..ALL - 1 {
-        order += 1.0;
-        logarithm[n + 1] = half / order * v[n];
-    }
-    Series {
-        // At t = −1 the increasing series is least, so the bound is relative to the smallest x of the cell. NaN fails the comparison, so a series with NaN is
-        // refused.
-        x: (omitted(&x) <= TOLERANCE * Cell::new(&terms).sum(-1.0)).then_some(terms),
-        // An absolute error of the logarithm is a relative error of x.
-        logarithm: (omitted(&logarithm) <= NEAR).then(|| kept(&logarithm)),
-    }
+    (core::array::from_fn(|n| x[n]), x[TERMS..].iter().map(|term| term.abs()).sum())
 }
