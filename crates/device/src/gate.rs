@@ -149,15 +149,17 @@ impl Gate {
         // Noted for a zero force too, because the gap is between turns of the loop, not between forces.
         self.last_at = Some(moment.now);
         if let Some(cause) = self.zero_cause(wanted, moment, since.is_some_and(|since| since > self.limits.gap)) {
-            self.withdraw();
+            self.last = [0.0; 3];
             return Admitted { force: GatedForce::ZERO, verdict: Verdict::Zero(cause) };
         }
         self.limited(wanted, since.map_or(0.0, |since| since.as_secs_f64()))
     }
 
-    /// Tells that the driver gave zero in place of the force admitted last: the next force grows from zero.
-    pub const fn withdraw(&mut self) {
+    /// Tells that the driver gave zero at `now`, in place of the force admitted last or without a force to admit: the next force grows from zero, from `now`
+    /// on. Counts as a turn of the loop.
+    pub const fn withdraw(&mut self, now: Instant) {
         self.last = [0.0; 3];
+        self.last_at = Some(now);
     }
 
     /// Returns the first reason for zero force.

@@ -75,6 +75,27 @@ fn each_reason_alone_makes_zero_at_once() {
     }
 }
 
+/// The pause is between turns of the loop: a turn with zero force is a turn, too.
+#[test]
+fn turns_without_force_are_no_pause() {
+    let mut gate = gate(Limits::DEFAULT);
+    gate.admit([1.0; 3], &well(at(0)));
+    for ms in [15, 30, 45] {
+        assert_eq!(cause(gate.admit([1.0; 3], &Moment { armed: false, ..well(at(ms)) })), ZeroCause::NotArmed);
+    }
+    assert_eq!(gate.admit([0.0, 3.0, 0.0], &well(at(60))).force.newtons(), [0.0, 3.0, 0.0]);
+}
+
+#[test]
+fn a_force_whose_length_overflows_keeps_its_direction() {
+    let mut gate = gate(Limits { force: 3.0, slew: 1e6, ..Limits::DEFAULT });
+    gate.admit([0.0; 3], &well(at(0)));
+    let found = gate.admit([f64::MAX, -f64::MAX, f64::MAX], &well(at(1)));
+    let part = 3.0_f64.sqrt();
+    assert!([part, -part, part].iter().zip(found.force.newtons()).all(|(expected, found)| (found - expected).abs() < 1e-12), "{found:?}");
+    assert_eq!(found.verdict, Verdict::Out(Changes { limited: true, slewed: false }));
+}
+
 /// With all conditions broken at once, the causes come in their order, as one condition after the other is repaired.
 #[test]
 fn the_first_cause_counts() {
@@ -126,8 +147,11 @@ fn a_withdrawn_force_is_zero_for_the_next_change() {
     for ms in 0..4 {
         gate.admit([3.0, 0.0, 0.0], &well(at(ms)));
     }
-    gate.withdraw();
+    gate.withdraw(at(3));
     assert_eq!(gate.admit([3.0, 0.0, 0.0], &well(at(4))).force.newtons(), [1.0, 0.0, 0.0]);
+    // The zero may go out between two turns: the force has been zero for 1 ms of the 5 ms since the turn before.
+    gate.withdraw(at(8));
+    assert_eq!(gate.admit([3.0, 0.0, 0.0], &well(at(9))).force.newtons(), [1.0, 0.0, 0.0]);
 }
 
 #[test]
@@ -136,7 +160,7 @@ fn limits_that_make_no_sense_are_refused() {
     for number in [-1.0, 20.1, f64::NAN, f64::INFINITY] {
         assert!(refused(Limits { force: number, ..Limits::DEFAULT }));
     }
-    for number in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+    for number in [0.0, -1.0, 1.1e6, f64::NAN, f64::INFINITY] {
         assert!(refused(Limits { slew: number, ..Limits::DEFAULT }));
     }
     assert!(refused(Limits { gap: Duration::ZERO, ..Limits::DEFAULT }));

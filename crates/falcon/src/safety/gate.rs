@@ -146,7 +146,7 @@ impl ForceGate {
         let motors = position.and_then(Jacobian::at).and_then(|jacobian| MotorCounts::of(admitted.force, &jacobian, &self.calibration));
         let Some((motors, saturated)) = motors else {
             // Zero goes out in place of the admitted force, so the next force grows from zero.
-            self.gate.withdraw();
+            self.gate.withdraw(now);
             return Self::zero(ZeroCause::NoTorques);
         };
         let cohaptic_device::Changes { limited, slewed } = changes;

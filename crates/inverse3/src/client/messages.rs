@@ -39,7 +39,7 @@ impl Client {
         let Some(device) = self.device.clone().filter(|_| self.is_listed) else {
             self.exchanges.send(now, [0.0; 3], None, false);
             self.sent_force = [0.0; 3];
-            self.gate.withdraw();
+            self.gate.withdraw(now);
             // A device that the list leaves out may still be there: zero goes to its id all the same.
             let request = Request { device: self.device.clone(), force: self.device.is_some().then_some([0.0; 3]), ..Request::INVENTORY };
             return self.actions.push_back(Action::Send(request.write(self.format)));
@@ -77,14 +77,14 @@ impl Client {
     }
 
     /// Forgets everything that a connection told.
-    pub(super) fn forget(&mut self) {
+    pub(super) fn forget(&mut self, now: Instant) {
         self.lose();
         self.exchanges.give_up();
         self.exchanges.sent = None;
         self.is_doubtful = false;
         (self.is_listed, self.is_ready, self.is_transformed, self.is_braked) = (false, false, false, false);
         (self.reading, self.place, self.sent_force) = (None, None, [0.0; 3]);
-        self.gate.withdraw();
+        self.gate.withdraw(now);
     }
 
     /// Closes the connection, to open another one. A zero force goes first: else the device would keep the latest force until it idles.

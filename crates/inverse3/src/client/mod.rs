@@ -216,7 +216,7 @@ impl Client {
 
     /// Tells that the connection has ended or could not be opened.
     pub fn closed(&mut self, now: Instant) {
-        self.forget();
+        self.forget(now);
         // A message to a connection that has ended must not go to the next connection.
         self.actions.retain(|action| *action == Action::Close);
         match self.link {

@@ -175,11 +175,89 @@ fn a_late_reply_is_not_taken_for_the_reply_to_the_zero() {
         client.receive(at(ms), &reply(&["04C3"], ""));
         assert!(sent(&mut client, at(ms)).is_empty() && client.snapshot(at(ms)).for_peer().is_none(), "{ms}");
     }
+    // Neither has ended the doubt: the reply to the zero is waited for.
+    assert_eq!(client.poll_timeout(), Some(due + LOST));
     client.receive(at(219), &reply(&["04C3"], CENTRED));
     assert_eq!(client.snapshot(at(219)).reading.unwrap().1, due);
     // The force that waited for the reply goes out with it.
     assert_eq!(request(&mut client, at(219), Format::V35).force, Some([0.5, 0.0, 0.0]));
     assert_eq!((client.report().older, client.report().unasked), (1, 1));
+}
+
+/// After 100 ms without the reply to a zero, no reply is waited for any more, and the next one counts whatever its form.
+#[test]
+fn replies_that_never_come_are_given_up() {
+    let mut client = active();
+    client.hold(at(206), force([0.5, 0.0, 0.0]));
+    sent(&mut client, at(206));
+    let due = at(216) + Duration::from_nanos(1);
+    client.handle_timeout(due);
+    assert_eq!(sent(&mut client, due).len(), 1);
+    let again = due + LOST;
+    assert_eq!(client.poll_timeout(), Some(again));
+    client.handle_timeout(again);
+    let request = request(&mut client, again, Format::V35);
+    assert_eq!((request.force, client.report().lost), (Some([0.0; 3]), 2));
+    client.receive(again, &reply(&["04C3"], ""));
+    assert_eq!(client.snapshot(again).reading.unwrap().1, again);
+}
+
+#[test]
+fn a_list_without_the_device_gets_a_zero_for_its_id_at_once() {
+    let mut client = active();
+    client.hold(at(206), force([0.5, 0.0, 0.0]));
+    sent(&mut client, at(206));
+    client.receive(at(207), &reply(&[], ""));
+    let request = request(&mut client, at(207), Format::V35);
+    assert_eq!((request.device.as_deref(), request.force), (Some("04C3"), Some([0.0; 3])));
+    assert_eq!((client.snapshot(at(207)).phase, client.report().losses), (Phase::NoDevice, 1));
+}
+
+/// The zero to a missing device passes no gate. A force after the zero grows from the zero's instant, not from the force before.
+#[test]
+fn a_device_that_is_back_at_once_gets_a_force_that_grows_from_the_zero() {
+    let mut client = connected(ClientConfig { arming_time: Duration::ZERO, ..ClientConfig::DEFAULT }, V35, &["04C3"], CENTRED);
+    sent(&mut client, at(1));
+    client.receive(at(2), &reply(&["04C3"], CENTRED));
+    exchange(&mut client, 3, 10, [0.5, 0.0, 0.0]);
+    assert_eq!(client.snapshot(at(9)).force, [0.5, 0.0, 0.0]);
+    client.receive(at(10), &reply(&[], ""));
+    assert_eq!(request(&mut client, at(10), Format::V35).force, Some([0.0; 3]));
+    client.hold(at(10), force([0.5, 0.0, 0.0]));
+    client.receive(at(10), &reply(&["04C3"], ""));
+    assert_eq!(request(&mut client, at(10), Format::V35).force, Some([0.0; 3]));
+    client.hold(at(10), force([0.5, 0.0, 0.0]));
+    let later = at(10) + Duration::from_micros(250);
+    client.receive(later, &reply(&["04C3"], ""));
+    assert_eq!(request(&mut client, later, Format::V35).force, Some([0.25, 0.0, 0.0]));
+}
+
+#[test]
+fn another_mounting_than_at_the_start_disarms() {
+    let mut client = active();
+    client.hold(at(206), force([0.5, 0.0, 0.0]));
+    sent(&mut client, at(206));
+    client.receive(at(207), &reply(&["04C3"], &CENTRED.replace(r#""mount":{}"#, r#""mount":{"preset":"wall"}"#)));
+    assert_eq!((client.snapshot(at(207)).phase, client.report().losses), (Phase::Turned, 1));
+}
+
+/// A new connection is a new session of the service: the preset is asked for again, and bad replies count from 0.
+#[test]
+fn a_new_connection_begins_anew() {
+    let mut client = active();
+    for ms in 206..215 {
+        client.hold(at(ms), force([0.5, 0.0, 0.0]));
+        sent(&mut client, at(ms));
+        client.receive(at(ms), "no JSON");
+    }
+    client.closed(at(215));
+    assert_eq!(client.poll_action(at(465)), Some(Action::Connect));
+    client.connected(at(465), V35);
+    client.receive(at(466), "no JSON");
+    assert_eq!((client.poll_action(at(466)), client.report().connections), (None, 2));
+    client.receive(at(467), &reply(&["04C3"], UNCENTRED));
+    let first = request(&mut client, at(467), Format::V35);
+    assert_eq!((first.centred, first.full, first.force), (true, true, Some([0.0; 3])));
 }
 
 #[test]
@@ -216,6 +294,8 @@ fn an_event_sends_zero_at_once_although_a_reply_is_outstanding() {
         client.receive_event(at(206), &event);
         assert_eq!(request(&mut client, at(206), Format::V35).force, Some([0.0; 3]), "{event:?}");
         assert_eq!((client.snapshot(at(206)).force, client.report().losses), ([0.0; 3], 1), "{event:?}");
+        let is_lost = matches!(event, Event::Disconnected(_));
+        assert_eq!(client.snapshot(at(206)).phase == Phase::NoDevice, is_lost, "{event:?}");
         // A brake holds until its release, and then the device must be armed anew.
         client.receive(at(207), &reply(&["04C3"], ""));
         client.receive(at(208), &reply(&["04C3"], ""));
@@ -332,6 +412,15 @@ fn a_stop_sends_zero_waits_and_closes() {
     let mut answered = stopped();
     answered.receive(at(207), &reply(&["04C3"], ""));
     assert_eq!((answered.poll_action(at(207)), answered.is_over()), (Some(Action::Close), true));
+    // The reply to a message before the zero does not end the wait.
+    let mut older = active();
+    older.hold(at(206), force([0.5, 0.0, 0.0]));
+    older.stop(at(206));
+    assert_eq!(sent(&mut older, at(206)).len(), 2);
+    older.receive(at(207), &reply(&["04C3"], ""));
+    assert_eq!((older.poll_action(at(207)), older.is_over()), (None, false));
+    older.receive(at(208), &reply(&["04C3"], ""));
+    assert_eq!((older.poll_action(at(208)), older.is_over()), (Some(Action::Close), true));
     let mut silent = stopped();
     assert_eq!(silent.poll_timeout(), Some(at(256)));
     silent.handle_timeout(at(256));
