@@ -31,7 +31,8 @@ pub(crate) fn variance(values: &[f64]) -> Option<f64> {
 }
 
 /// Returns the autocorrelation at lags 1 to `lags` of a series with missing values: the mean product of deviations over pairs with both values, divided by
-/// the variance over all values (Parzen 1963, Sankhyā A 25(4)). Empty for a constant series; shorter than `lags` if no pair is that far apart.
+/// the variance over all values (Parzen 1963, Sankhyā A 25(4)), or by the variance within the pairs where that is larger, so that no result is beyond ±1. Empty
+/// for a constant series; shorter than `lags` if no pair is that far apart.
 pub(crate) fn autocorrelation(series: &[Option<f64>], lags: usize) -> Vec<f64> {
     let present: Vec<f64> = series.iter().filter_map(|value| *value).collect();
     let Some(mean) = mean(&present) else { return Vec::new() };
@@ -39,12 +40,28 @@ pub(crate) fn autocorrelation(series: &[Option<f64>], lags: usize) -> Vec<f64> {
     if power <= 0.0 {
         return Vec::new();
     }
-    let at_lag = |lag: usize| {
-        let pairs = series.iter().zip(series.iter().skip(lag)).filter_map(|(one, other)| Some((one.as_ref()?, other.as_ref()?)));
-        let (sum, pairs) = pairs.fold((0.0, 0_usize), |(sum, pairs), (one, other)| (sum + (one - mean) * (other - mean), pairs + 1));
-        (pairs > 0).then(|| sum / count(pairs) / power)
-    };
-    (1..=lags).map_while(at_lag).collect()
+    let deviations: Vec<Option<f64>> = series.iter().map(|value| value.map(|value| value - mean)).collect();
+    (1..=lags).map_while(|lag| correlation_of_pairs(&deviations, power, lag).map(|(correlation, _)| correlation)).collect()
+}
+
+/// Returns the correlation of deviations from the mean that are `lag` apart, and the number of pairs with both values; `None` without a pair. `power` is the mean
+/// square of all deviations.
+///
+/// Pairs may vary more than all values: the values at both ends have one neighbour only, and a value beside a gap may have none. The mean product can then exceed
+/// `power`, but never the geometric mean of the mean squares of the earlier and of the later values of the pairs (Cauchy and Schwarz).
+pub(crate) fn correlation_of_pairs(deviations: &[Option<f64>], power: f64, lag: usize) -> Option<(f64, f64)> {
+    let pairs = deviations.iter().zip(deviations.iter().skip(lag)).filter_map(|(one, other)| Some(((*one)?, (*other)?)));
+    let (mut product, mut earlier, mut later, mut number) = (0.0, 0.0, 0.0, 0_usize);
+    for (one, other) in pairs {
+        product += one * other;
+        earlier += one * one;
+        later += other * other;
+        number += 1;
+    }
+    let pairs = count(number);
+    let whole = (pairs * power).max((earlier * later).sqrt());
+    // The sums are rounded, so that a result could still be beyond 1 by its last digit.
+    (number > 0).then(|| ((product / whole).clamp(-1.0, 1.0), pairs))
 }
 
 /// Returns Wilson's interval at confidence 0.95 for a proportion of independent events (Wilson 1927, JASA 22(158)): all probabilities p such that the found
@@ -110,6 +127,20 @@ mod tests {
         assert!(autocorrelation(&[Some(1.0); 5], 3).is_empty());
         assert_eq!(autocorrelation(&[Some(1.0), Some(2.0)], 3).len(), 1);
         assert!(autocorrelation(&[None, None], 3).is_empty());
+    }
+
+    /// A wave of 100 values that begins at its mean: the sum of the products is cos(2π/100) times the sum of the squares, but there are 99 products only, so that
+    /// the mean product is 1.008 times the variance.
+    #[test]
+    fn no_autocorrelation_is_beyond_one() {
+        let wave: Vec<_> = (0..100).map(|place| Some((core::f64::consts::TAU * f64::from(place) / 100.0).sin())).collect();
+        let found = autocorrelation(&wave, 1)[0];
+        assert!((found - (core::f64::consts::TAU / 100.0).cos()).abs() < 1e-4, "{found}");
+        // The only pair has the two values that are farthest from the mean.
+        assert_eq!(autocorrelation(&[Some(2.0), Some(2.0), None, Some(0.0), None, Some(0.0), None, Some(0.0)], 1), [1.0]);
+        assert_eq!(autocorrelation(&[Some(2.0), Some(-2.0), None, Some(0.0), None, Some(0.0)], 1), [-1.0]);
+        // The three pairs vary less than all values, whose variance is 5: the mean product of 3, −1 and 3 is divided by 5.
+        assert_eq!(autocorrelation(&[Some(3.0), Some(1.0), Some(-1.0), Some(-3.0)], 1), [5.0 / 15.0]);
     }
 
     #[test]

@@ -46,9 +46,10 @@ fn an_example_worked_by_hand() {
     let delay = achieved.delay.as_ref().unwrap();
     assert_eq!([delay.mean_s, delay.sd_s.unwrap(), delay.least_s, delay.greatest_s], [0.02, 0.01, 0.01, 0.03]);
     assert_eq!((delay.quantiles_s["0.5"], delay.quantiles_s["0.25"]), (0.02, 0.015));
-    // Pairs of received packets: lag 1: (30, 10); lag 3: (20, 30); lag 4: (20, 10); none at lag 2, where the list ends. Variance 200/3.
+    // Pairs of received packets: lag 1: (30, 10); lag 3: (20, 30); lag 4: (20, 10); none at lag 2, where the list ends. The only
+    // product, −100, is −1.5 times the variance of 200/3, but −1 times the variance of the pair.
     assert_eq!(delay.autocorrelation.len(), 1);
-    assert!((delay.autocorrelation[0] + 1.5).abs() < 1e-12);
+    assert!((delay.autocorrelation[0] + 1.0).abs() < 1e-12);
 
     assert_eq!((achieved.loss.value, achieved.loss.received, achieved.loss.lost), (Some(0.4), 3, 2));
     assert_eq!((achieved.loss.run_mean, achieved.loss.gap_mean), (Some(2.0), Some(1.5)));

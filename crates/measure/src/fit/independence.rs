@@ -17,7 +17,7 @@ use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::law::normal_quantile;
-use crate::series::count;
+use crate::series::{correlation_of_pairs, count};
 
 /// Result of the test of independent delays.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
@@ -52,8 +52,8 @@ pub(super) fn test(delays: &[Option<f64>]) -> Option<Independence> {
     let ranks = ranks(delays)?;
     // A quarter of the packets at most: the law of Q needs many more pairs than lags.
     let lags = LAGS.min(ranks.len() / 4).max(1);
-    let (neighbours, pairs) = correlation(&ranks, 1)?;
-    let found = (1..=lags).filter_map(|lag| correlation(&ranks, lag));
+    let (neighbours, pairs) = correlation_of_pairs(&ranks, 1.0, 1)?;
+    let found = (1..=lags).filter_map(|lag| correlation_of_pairs(&ranks, 1.0, lag));
     // Lags without a pair, as where every second packet is lost, are no terms of the sum.
     let (terms, statistic) = found.fold((0, 0.0), |(terms, sum), (r, pairs)| (terms + 1, sum + pairs * r * r));
     let law = ChiSquared::new(count(terms)).ok()?;
@@ -76,13 +76,6 @@ fn ranks(values: &[Option<f64>]) -> Option<Vec<Option<f64>>> {
     }
     let sd = (squares / count(order.len())).sqrt();
     (sd > 0.0).then(|| ranks.into_iter().map(|rank| Some(rank? / sd)).collect())
-}
-
-/// Returns the mean product over the pairs that are `lag` packets apart, and the number of these pairs. `None` without a pair.
-fn correlation(ranks: &[Option<f64>], lag: usize) -> Option<(f64, f64)> {
-    let pairs = ranks.iter().zip(ranks.iter().skip(lag)).filter_map(|(one, other)| Some((*one)? * (*other)?));
-    let (pairs, sum) = pairs.fold((0.0, 0.0), |(pairs, sum), product| (pairs + 1.0, sum + product));
-    (pairs > 0.0).then(|| (sum / pairs, pairs))
 }
 
 #[cfg(test)]
