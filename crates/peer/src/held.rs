@@ -187,7 +187,7 @@ impl<const A: usize> Held<A> {
     /// # Panics
     ///
     /// If the index `place` is out of range.
-    #[inline]
+    #[inline(always)]
     pub fn accept(&mut self, place: usize, sequence: u64, sent: Instant, state: State<A>) -> bool {
         // Sequence number 2^64 − 1 has no successor for `next`, so `ended` notes its arrival.
         let newer = sequence >= self.samples[place].next && (sequence < u64::MAX || self.take_last(place));
@@ -235,7 +235,7 @@ impl<const A: usize> Held<A> {
     }
 
     /// Replaces a held sample, and updates the exact sums.
-    #[inline]
+    #[inline(always)]
     fn replace(&mut self, place: usize, sample: HeldSample<A>) {
         if let Some(sums) = &mut self.sums {
             sums.replace(&self.samples[place].state, &sample.state);

@@ -202,6 +202,18 @@ impl<E: Event> EventQueue<E> {
         place.take().map(take)
     }
 
+    /// Returns the key of the first event if its instant is at most `now`.
+    #[inline]
+    pub(crate) fn due_key(&mut self, now: Instant) -> Option<E::Key> {
+        if self.in_order {
+            return self.ordered.front().filter(|first| first.at() <= now).map(Event::key);
+        }
+        if self.front.front().is_none_or(|first| first.0 > now) && !self.advance(now) {
+            return None;
+        }
+        self.front.front().and_then(|first| self.slab.key(first.1))
+    }
+
     /// Returns whether an event may be due at `now`, without a search. `false` is certain. After `true`, no event need be due.
     #[inline(always)]
     pub(crate) fn may_be_due(&self, now: Instant) -> bool {

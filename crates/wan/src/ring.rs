@@ -61,6 +61,12 @@ impl<T> Ring<T> {
         self.places.get(self.first)?.as_ref()
     }
 
+    /// Returns the first value, for a change.
+    #[inline(always)]
+    pub(crate) fn front_mut(&mut self) -> Option<&mut T> {
+        self.places.get_mut(self.first)?.as_mut()
+    }
+
     /// Returns the last value.
     #[must_use]
     #[inline(always)]

@@ -34,6 +34,26 @@ impl<const A: usize> LawStrategy<A> {
         let past = (lag > 0).then(|| Past::new(lag));
         Self { coordination, parameters, law, memory, past }
     }
+
+    /// Returns whether the law has neither a memory nor a lag, so that [`LawStrategy::at_once`] is its command.
+    #[inline(always)]
+    pub(super) fn is_of_the_present(&self) -> bool {
+        self.memory.is_empty() && self.past.is_none()
+    }
+
+    /// Returns the command of a law without memory and lag.
+    #[inline(always)]
+    pub(super) fn at_once(&self, context: &Context<'_, A>) -> Command<A> {
+        let mut command = Command { force: [0.0; A], target: State::REST };
+        let lead = context.held.lead();
+        for (axis, lead) in lead.into_iter().enumerate() {
+            let own = context.own.along(axis);
+            let (force, target) = self.law.command(&Observation { own, past: own, mean: context.held.mean().along(axis), lead }, &mut []);
+            command.force[axis] = force;
+            command.target.set_along(axis, target);
+        }
+        command
+    }
 }
 
 impl<const A: usize> Strategy<A> for LawStrategy<A> {

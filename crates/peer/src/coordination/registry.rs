@@ -145,12 +145,25 @@ macro_rules! registry {
             $(#[doc = concat!("See [`", stringify!($controller), "`].")] $controller($controller<A>),)+
         }
 
-        impl<const A: usize> Strategy<A> for BuiltInStrategy<A> {
-            #[inline]
-            fn command(&mut self, context: &Context<'_, A>) -> Command<A> {
+        impl<const A: usize> BuiltInStrategy<A> {
+            /// Returns the command of a strategy with a memory.
+            #[inline(never)]
+            fn command_apart(&mut self, context: &Context<'_, A>) -> Command<A> {
                 match self {
                     Self::Law(law) => law.command(context),
                     $(Self::$controller(controller) => controller.command(context),)+
+                }
+            }
+        }
+
+        impl<const A: usize> Strategy<A> for BuiltInStrategy<A> {
+            #[inline(always)]
+            fn command(&mut self, context: &Context<'_, A>) -> Command<A> {
+                // The laws of most scenes become part of the loop over peers, and the others stay out of it: with all of them in it, the loop needs more
+                // registers than there are (`benches/peers`, rows of watched packets).
+                match self {
+                    Self::Law(law) if law.is_of_the_present() => law.at_once(context),
+                    Self::Law(_) $(| Self::$controller(_))+ => self.command_apart(context),
                 }
             }
 

@@ -13,9 +13,11 @@
 //! payloads: the driver gives the time.
 
 mod awaited;
+mod broadcast;
 mod config;
 pub(crate) mod direct_links;
 mod finding;
+mod groups;
 pub(crate) mod id;
 mod lines;
 mod on_demand;
@@ -52,9 +54,6 @@ use crate::packet::{Outputs, PacketInfo};
 
 /// Number of nodes, at most, of a [`Network`] with links between all nodes. Link numbers have 29 bits, and the table of links has `MOST_NODES`² entries.
 pub const MOST_NODES: usize = 23_170;
-
-/// Number of receivers of a packet with random words drawn at once.
-const DRAWN_AT_ONCE: u16 = 8;
 
 /// A network of N nodes as a state machine.
 ///
@@ -312,70 +311,7 @@ impl<P: Clone> Network<P> {
         };
         // A packet with an uplink meets its link only after the uplink, and the link then counts the packet.
         let line = if self.lines.uplinks[path.from.index()].is_some() { LineId::Uplink(path.from) } else { LineId::Link(link) };
-        self.offer(now, line, None, || InNetwork { sequence, offered: now, entered: now, path, size, payload });
-    }
-
-    /// Takes a packet from one node to each of its receivers, in the order of receivers. The result is the same as the result of [`Network::handle_packet`] for
-    /// each receiver; work common to all receivers is done once.
-    ///
-    /// # Errors
-    ///
-    /// [`NetworkError`] if `now` is before an earlier call's instant or the node is missing; the network is unchanged then.
-    pub fn handle_broadcast(&mut self, now: Instant, from: NodeId, info: impl Into<PacketInfo>, payload: P) -> Result<(), NetworkError> {
-        let info = info.into();
-        if from.0 >= self.nodes {
-            return Err(NetworkError::NoLink { from, to: from });
-        }
-        // The uplink is passed once, so a single offer stands for all receivers.
-        if self.has_relay && self.lines.uplinks[from.index()].is_some() {
-            self.let_pass(now)?;
-            self.send_to_relay(now, from, SizeAndMarks::new(info), payload);
-            return Ok(());
-        }
-        if self.has_uplinks {
-            // Packets of a node with an uplink pass the uplink one after another, so they have no work in common.
-            let mut place = 0;
-            while let Some(to) = self.places.receiver(from, place) {
-                if to != from {
-                    self.handle_packet(now, from, to, info, payload.clone())?;
-                }
-                place += 1;
-            }
-            return Ok(());
-        }
-        self.let_pass(now)?;
-        let size = SizeAndMarks::new(info);
-        if self.lines.on_demand.is_some() || matches!(self.places, Paths::Some(_)) {
-            // The place of each link needs a lookup, so random words are not drawn ahead for neighbours.
-            let mut place = 0;
-            while let Some(to) = self.places.receiver(from, place) {
-                if to != from {
-                    self.send(now, Path { from, to }, size, payload.clone(), None);
-                }
-                place += 1;
-            }
-            return Ok(());
-        }
-        if !self.is_random {
-            // No link draws random numbers, so no words need to be collected first.
-            for to in (0..self.nodes).map(NodeId).filter(|to| *to != from) {
-                self.send(now, Path { from, to }, size, payload.clone(), None);
-            }
-            return Ok(());
-        }
-        for begin in (0..self.nodes).step_by(usize::from(DRAWN_AT_ONCE)) {
-            // All draws for some receivers come before any other work. The draws do not depend on each other, so a processor can compute several at once.
-            let receivers = (begin..self.nodes.min(begin + DRAWN_AT_ONCE)).map(NodeId);
-            let mut words = [[0; 2]; DRAWN_AT_ONCE as usize];
-            for (words, to) in words.iter_mut().zip(receivers.clone()) {
-                // The diagonal link has words as well, so `words` and `receivers` stay in step; the filter below leaves this link out.
-                *words = self.lines.links[self.link(Path { from, to }).index()].words();
-            }
-            for (words, to) in words.into_iter().zip(receivers).filter(|(_, to)| *to != from) {
-                self.send(now, Path { from, to }, size, payload.clone(), Some(words));
-            }
-        }
-        Ok(())
+        self.offer(now, line, || InNetwork { sequence, offered: now, entered: now, path, size, payload });
     }
 
     /// Lets time pass until `now`. All events due become pollable.
@@ -405,7 +341,7 @@ impl<P: Clone> Network<P> {
     /// last instant given, once all events are polled. After a change of rate nothing may happen at the instant.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        self.traffic.pending.next_at()
+        self.traffic.next_at()
     }
 
     /// Returns whether an event may happen up to `now`, or has happened and was not polled. `false` is certain: calls of [`Network::handle_timeout`] and
@@ -413,7 +349,7 @@ impl<P: Clone> Network<P> {
     #[must_use]
     #[inline(always)]
     pub fn may_have_events(&self, now: Instant) -> bool {
-        !self.traffic.happened.is_empty() || self.traffic.pending.may_be_due(now)
+        !self.traffic.happened.is_empty() || self.traffic.may_be_due(now)
     }
 
     /// Returns the instant of the next call of [`Network::handle_timeout`] necessary for a packet to reach one of the receivers of [`Network::awaiting`] in
@@ -435,7 +371,7 @@ impl<P: Clone> Network<P> {
         if let Some(event) = self.traffic.happened.pop_front() {
             return Some(event);
         }
-        while let Some(pending) = self.traffic.pending.pop_due(self.now) {
+        while let Some(pending) = self.traffic.pop_due(self.now) {
             if let Some(event) = self.happen(pending) {
                 return Some(event);
             }
@@ -464,13 +400,11 @@ impl<P: Clone> Network<P> {
         }
         let Self { now, traffic, lines, .. } = self;
         // Without inner events, no engine is woken, no packet has passed another line before its link, and no packet is damaged.
-        let taken = traffic.pending.take_due(*now, |Pending { at, sequence, offered, entered, turn, path, size, payload }| {
-            lines.link_mut(turn.link()).deliver(entered, at);
-            payload.map(|payload| {
-                take(InNetwork { sequence, offered, entered, path, size, payload }.event(LineId::Link(turn.link()), at, Fate::Delivered(at), None))
-            })
-        });
-        taken.flatten()
+        let Pending { at, sequence, offered, entered, turn, path, size, payload } = traffic.pop_due(*now)?;
+        lines.link_mut(turn.link()).deliver(entered, at);
+        payload.map(|payload| {
+            take(InNetwork { sequence, offered, entered, path, size, payload }.event(LineId::Link(turn.link()), at, Fate::Delivered(at), None))
+        })
     }
 
     /// Changes the model of a link from `now` on: see [`crate::Link::set_model`].

@@ -12,7 +12,6 @@ use super::traffic::Exits;
 use crate::fates::fate::{DropCause, Fate};
 use crate::fates::record::PacketEvent;
 use crate::line::Line;
-use crate::line::direct::Words;
 use crate::line::filter::Offered;
 use crate::line::pipeline::Outcome;
 use crate::packet::{Marks, Outputs};
@@ -21,7 +20,7 @@ impl<P: Clone> Network<P> {
     /// Lets all events due by `now` happen, and keeps the final arrivals in `happened` for the poll.
     #[inline]
     pub(super) fn let_happen(&mut self, now: Instant) {
-        while let Some(pending) = self.traffic.pending.pop_due(now) {
+        while let Some(pending) = self.traffic.pop_due(now) {
             if let Some(event) = self.happen(pending) {
                 self.traffic.happened.push_back(event);
             }
@@ -34,7 +33,7 @@ impl<P: Clone> Network<P> {
     /// network.
     #[inline(always)]
     pub(super) fn settle(&mut self, now: Instant) {
-        if !self.has_inner_events && self.traffic.pending.may_be_due(now) {
+        if !self.has_inner_events && self.traffic.may_be_due(now) {
             self.let_happen(now);
         }
     }
@@ -72,7 +71,7 @@ impl<P: Clone> Network<P> {
         // The left line has delivered the packet, whatever the next line does.
         let Some(next) = next else { return Some(self.arrive(at, line, packet)) };
         self.lines.get_mut(line).deliver(entered, at);
-        self.offer(at, next, None, || InNetwork { entered: at, ..packet });
+        self.offer(at, next, || InNetwork { entered: at, ..packet });
         None
     }
 
@@ -94,27 +93,34 @@ impl<P: Clone> Network<P> {
         self.with_engine(line, |line, outputs, exits| line.wake(at, outputs, exits));
     }
 
-    /// Offers a packet to its link in a network without uplinks. `words` holds the first random words of the packet if they were drawn before.
+    /// Offers a packet to its link in a network without uplinks.
     #[inline(always)]
-    pub(super) fn send(&mut self, now: Instant, path: Path, size: SizeAndMarks, payload: P, words: Option<Words>) {
+    pub(super) fn send(&mut self, now: Instant, path: Path, size: SizeAndMarks, payload: P) {
         let (link, place) = self.link_and_place(path);
         // As if the packets of a broadcast were sent singly: an arrival of an earlier packet at `now` comes before the events of this packet. After `let_pass`,
         // because the link may just have been made, and may have switched the network to inner events.
-        if self.has_inner_events && self.traffic.pending.may_be_due(now) {
+        if self.has_inner_events && self.traffic.may_be_due(now) {
             self.let_happen(now);
         }
         let sequence = self.lines.links[place].offered();
-        self.offer(now, LineId::Link(link), words, || InNetwork { sequence, offered: now, entered: now, path, size, payload });
+        self.offer(now, LineId::Link(link), || InNetwork { sequence, offered: now, entered: now, path, size, payload });
     }
 
-    /// Offers a packet to a line. `words` holds the first random words of the packet if they were drawn before. `packet` is called only in the branch that
-    /// needs the packet, so a packet in mere propagation is written once, into the event queue.
+    /// Offers a packet to a line. `packet` is called only in the branch that needs the packet, so a packet in mere propagation is written once, into the event
+    /// queue.
     #[inline(always)]
-    pub(super) fn offer(&mut self, now: Instant, line: LineId, words: Option<Words>, packet: impl FnOnce() -> InNetwork<P>) {
+    pub(super) fn offer(&mut self, now: Instant, line: LineId, packet: impl FnOnce() -> InNetwork<P>) {
         if self.has_filters {
-            return self.offer_filtered(now, line, words, packet());
+            return self.offer_filtered(now, line, packet());
         }
-        match self.lines.get_mut(line).offer(now, words) {
+        let outcome = self.lines.get_mut(line).offer(now, None);
+        self.decided(now, line, outcome, packet);
+    }
+
+    /// Lets happen what a line has decided about a packet that was offered to it.
+    #[inline(always)]
+    pub(super) fn decided(&mut self, now: Instant, line: LineId, outcome: Outcome, packet: impl FnOnce() -> InNetwork<P>) {
+        match outcome {
             Outcome::Arrives(at) => {
                 self.settle_before(at, now);
                 self.traffic.schedule(at, line, packet());
@@ -126,19 +132,13 @@ impl<P: Clone> Network<P> {
 
     /// Offers a packet like [`Network::offer`], in a network with filters.
     #[inline(never)]
-    fn offer_filtered(&mut self, now: Instant, line: LineId, words: Option<Words>, packet: InNetwork<P>) {
+    fn offer_filtered(&mut self, now: Instant, line: LineId, packet: InNetwork<P>) {
         // A filter stands before all stages of its line.
         if self.is_filtered(now, line, &packet) {
             return self.drop(now, line, DropCause::Filter, packet);
         }
-        match self.lines.get_mut(line).offer(now, words) {
-            Outcome::Arrives(at) => {
-                self.settle_before(at, now);
-                self.traffic.schedule(at, line, packet);
-            }
-            Outcome::Dropped(cause) => self.drop(now, line, cause, packet),
-            Outcome::Enters => self.enter_engine(now, line, packet),
-        }
+        let outcome = self.lines.get_mut(line).offer(now, None);
+        self.decided(now, line, outcome, || packet);
     }
 
     /// Returns whether the line's filter drops the packet.

@@ -35,7 +35,7 @@ impl<P: Clone> Network<P> {
             place += 1;
         }
         let path = Path::to_relay(from);
-        self.offer(now, LineId::Uplink(from), None, || InNetwork { sequence, offered: now, entered: now, path, size, payload });
+        self.offer(now, LineId::Uplink(from), || InNetwork { sequence, offered: now, entered: now, path, size, payload });
     }
 
     /// Offers a packet after its uplink to the link of each receiver.
@@ -52,7 +52,7 @@ impl<P: Clone> Network<P> {
                 if let Some(damage) = &damage {
                     self.traffic.put_damage(&packet, damage.clone());
                 }
-                self.offer(now, LineId::Link(self.link(path)), None, || packet);
+                self.offer(now, LineId::Link(self.link(path)), || packet);
             }
             place += 1;
         }

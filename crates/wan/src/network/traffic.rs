@@ -6,6 +6,7 @@ use alloc::collections::{BTreeMap, VecDeque};
 use cohaptic_units::Instant;
 
 use super::awaited::Awaited;
+use super::groups::{Group, Groups};
 use super::id::{NodeId, Path};
 use super::pending::{InNetwork, LineId, Pending, SizeAndMarks, Turn};
 use crate::event_queue::{Event, EventQueue};
@@ -17,7 +18,9 @@ use crate::packet::Marks;
 
 #[derive(Clone, Debug)]
 pub(super) struct Traffic<P> {
-    pub(super) pending: EventQueue<Pending<P>>,
+    /// Events to come, apart from the packets in `groups`.
+    pending: EventQueue<Pending<P>>,
+    groups: Groups<P>,
     pub(super) happened: VecDeque<PacketEvent<P, Path>>,
     /// Damage of packets on their way, indexed by path, sequence and copy bits. A packet has an entry exactly if its flag `DAMAGED` is set, so undamaged
     /// packets are never looked up.
@@ -26,14 +29,53 @@ pub(super) struct Traffic<P> {
     pub(super) awaited: Option<Box<Awaited>>,
 }
 
-impl<P> Traffic<P> {
+impl<P: Clone> Traffic<P> {
     pub(super) fn new() -> Self {
-        Self { pending: EventQueue::new(), happened: VecDeque::new(), damages: BTreeMap::new(), awaited: None }
+        Self { pending: EventQueue::new(), groups: Groups::new(), happened: VecDeque::new(), damages: BTreeMap::new(), awaited: None }
+    }
+
+    /// Returns the instant of the next event.
+    pub(super) fn next_at(&self) -> Option<Instant> {
+        self.pending.next_at().into_iter().chain(self.groups.next_at()).min()
+    }
+
+    /// Returns whether an event may be due at `now`, without a search. `false` is certain.
+    #[inline(always)]
+    pub(super) fn may_be_due(&self, now: Instant) -> bool {
+        self.groups.next_at().is_some_and(|at| at <= now) || self.pending.may_be_due(now)
+    }
+
+    /// Removes and returns the first event if its instant is at most `now`.
+    #[inline(always)]
+    pub(super) fn pop_due(&mut self, now: Instant) -> Option<Pending<P>> {
+        match self.groups.due_key(now) {
+            // In most networks with groups the queue is empty.
+            Some(key) if self.pending.is_empty() || self.pending.due_key(now).is_none_or(|other| key < other) => self.groups.take(),
+            Some(_) | None => self.pending.take_due(now, |pending| pending),
+        }
+    }
+
+    /// Lets the packets of a group leave their links at the same instant.
+    pub(super) fn schedule_group(&mut self, mut group: Group<P>) {
+        // A driver that awaits single receivers is told of each packet.
+        if !group.is_single() && self.awaited.is_none() && self.groups.takes(&group) {
+            return self.groups.push(group);
+        }
+        while let Some((line, packet)) = group.pop() {
+            self.schedule(group.at, line, packet);
+        }
     }
 
     /// Lets a packet leave `line` at `at`: the packet propagates until then.
     #[inline(always)]
     pub(super) fn schedule(&mut self, at: Instant, line: LineId, packet: InNetwork<P>) {
+        self.schedule_after(None, at, line, packet);
+    }
+
+    /// Lets a packet leave `line` at `at`, like [`Traffic::schedule`]. `before` is the arrival of the latest scheduled packet, if it is known to leave a line
+    /// of the same kind with a lower number.
+    #[inline(always)]
+    pub(super) fn schedule_after(&mut self, before: Option<Instant>, at: Instant, line: LineId, packet: InNetwork<P>) {
         let InNetwork { sequence, offered, entered, path, size, payload } = packet;
         if let Some(awaited) = &mut self.awaited {
             // After a relay the packet goes to every receiver of its sender, so any awaited node may be concerned.
@@ -42,12 +84,15 @@ impl<P> Traffic<P> {
         let turn = Turn::arrival(line);
         // `Pending::key` orders the events. Instants and turns differ for nearly all pairs, so the whole key is compared only when both are
         // equal.
-        let follows = match self.pending.last_in_order() {
-            None => true,
-            Some(last) if last.at != at => last.at < at,
-            Some(last) if last.turn != turn => last.turn < turn,
-            Some(last) => last.key() <= (at, turn, sequence, path, size.copy()),
-        };
+        let follows = before.map_or_else(
+            || match self.pending.last_in_order() {
+                None => true,
+                Some(last) if last.at != at => last.at < at,
+                Some(last) if last.turn != turn => last.turn < turn,
+                Some(last) => last.key() <= (at, turn, sequence, path, size.copy()),
+            },
+            |before| before <= at,
+        );
         self.pending.push_made(at, follows, || Pending { at, sequence, offered, entered, turn, path, size, payload: Some(payload) });
     }
 
@@ -90,7 +135,7 @@ pub(super) struct Exits<'a, P> {
     pub(super) line: LineId,
 }
 
-impl<P> Exits<'_, P> {
+impl<P: Clone> Exits<'_, P> {
     fn marked(&self, packet: InNetwork<P>, copy: u8, marks: &Marks) -> InNetwork<P> {
         let size = packet
             .size
@@ -103,7 +148,7 @@ impl<P> Exits<'_, P> {
     }
 }
 
-impl<P> Sink<InNetwork<P>> for Exits<'_, P> {
+impl<P: Clone> Sink<InNetwork<P>> for Exits<'_, P> {
     fn arrives(&mut self, at: Instant, packet: InNetwork<P>, copy: u8, marks: Marks) {
         let packet = self.marked(packet, copy, &marks);
         if let Some(damage) = marks.damage {

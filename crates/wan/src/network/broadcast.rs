@@ -1,0 +1,167 @@
+//! Packets from one node to all its receivers.
+
+use cohaptic_units::Instant;
+
+use super::Network;
+use super::config::NetworkError;
+use super::groups::Group;
+use super::id::{LinkId, NodeId, Path};
+use super::paths::Paths;
+use super::pending::{InNetwork, LineId, SizeAndMarks};
+use super::traffic::Traffic;
+use crate::line::Line;
+use crate::line::pipeline::Outcome;
+use crate::packet::PacketInfo;
+
+/// Number of receivers of a packet with random words drawn at once.
+const DRAWN_AT_ONCE: u16 = 8;
+
+/// Links from one node to all nodes, in the order of receivers.
+type Row<P> = [Line<P, InNetwork<P>>];
+
+/// What all packets of a broadcast have in common.
+struct Sent<'a, P> {
+    now: Instant,
+    from: NodeId,
+    size: SizeAndMarks,
+    payload: &'a P,
+}
+
+/// A packet of a broadcast that does more than arrive later: its receiver, its number, and what its link has decided.
+struct Unusual {
+    to: NodeId,
+    sequence: u64,
+    outcome: Outcome,
+}
+
+impl<P: Clone> Network<P> {
+    /// Takes a packet from one node to each of its receivers, in the order of receivers. The result is the same as the result of [`Network::handle_packet`] for
+    /// each receiver; work common to all receivers is done once.
+    ///
+    /// # Errors
+    ///
+    /// [`NetworkError`] if `now` is before an earlier call's instant or the node is missing; the network is unchanged then.
+    pub fn handle_broadcast(&mut self, now: Instant, from: NodeId, info: impl Into<PacketInfo>, payload: P) -> Result<(), NetworkError> {
+        let info = info.into();
+        if from.0 >= self.nodes {
+            return Err(NetworkError::NoLink { from, to: from });
+        }
+        // The uplink is passed once, so a single offer stands for all receivers.
+        if self.has_relay && self.lines.uplinks[from.index()].is_some() {
+            self.let_pass(now)?;
+            self.send_to_relay(now, from, SizeAndMarks::new(info), payload);
+            return Ok(());
+        }
+        if self.has_uplinks {
+            // Packets of a node with an uplink pass the uplink one after another, so they have no work in common.
+            let mut place = 0;
+            while let Some(to) = self.places.receiver(from, place) {
+                if to != from {
+                    self.handle_packet(now, from, to, info, payload.clone())?;
+                }
+                place += 1;
+            }
+            return Ok(());
+        }
+        self.let_pass(now)?;
+        let size = SizeAndMarks::new(info);
+        if self.has_inner_events || self.has_filters || self.lines.on_demand.is_some() || matches!(self.places, Paths::Some(_)) {
+            let mut place = 0;
+            while let Some(to) = self.places.receiver(from, place) {
+                if to != from {
+                    self.send(now, Path { from, to }, size, payload.clone());
+                }
+                place += 1;
+            }
+            return Ok(());
+        }
+        self.send_directly(&Sent { now, from, size, payload: &payload });
+        Ok(())
+    }
+
+    /// Offers a packet to the links from a node to all other nodes. The network has no inner events and no filters, so that the links alone decide, and its
+    /// links lie in the order of receivers.
+    fn send_directly(&mut self, sent: &Sent<'_, P>) {
+        let first = self.link(Path { from: sent.from, to: NodeId(0) });
+        let mut begin = 0;
+        loop {
+            let row = &mut self.lines.links[first.index()..first.index() + usize::from(self.nodes)];
+            let schedule = if self.is_random { schedule_each } else { schedule_groups };
+            let unusual = schedule(row, first, &mut self.traffic, sent, begin);
+            let Some(Unusual { to, sequence, outcome }) = unusual else { return };
+            let packet = sent.packet(to, sequence);
+            self.decided(sent.now, link_to(first, to), outcome, || packet);
+            begin = to.0 + 1;
+        }
+    }
+}
+
+impl<P: Clone> Sent<'_, P> {
+    #[inline(always)]
+    fn packet(&self, to: NodeId, sequence: u64) -> InNetwork<P> {
+        let Self { now, from, size, payload } = *self;
+        InNetwork { sequence, offered: now, entered: now, path: Path { from, to }, size, payload: payload.clone() }
+    }
+}
+
+/// Returns the link to a node in the row of links that begins with the link `first`.
+#[inline(always)]
+fn link_to(first: LinkId, to: NodeId) -> LineId {
+    LineId::Link(LinkId(first.0 + u32::from(to.0)))
+}
+
+/// Offers a packet to each link of `row` from the receiver `begin` on, and schedules the arrivals that come later than the packet. Returns the first packet
+/// with any other fate; the rest of the row is then left. `first` is the number of the first link of the row. No link draws random numbers, so that most
+/// packets arrive together, and are scheduled together.
+#[inline(never)]
+fn schedule_groups<P: Clone>(row: &mut Row<P>, first: LinkId, traffic: &mut Traffic<P>, sent: &Sent<'_, P>, begin: u16) -> Option<Unusual> {
+    let Sent { now, from, size, payload } = *sent;
+    let mut group: Option<Group<P>> = None;
+    for (line, to) in row[usize::from(begin)..].iter_mut().zip(begin..).filter(|(_, to)| *to != from.0) {
+        // The number is taken before the offer, because the offer counts the packet.
+        let sequence = line.offered();
+        match (line.offer(now, None), &mut group) {
+            (Outcome::Arrives(at), Some(group)) if at == group.at && sequence == group.sequence => group.end = to + 1,
+            (Outcome::Arrives(at), _) if at > now => {
+                let next = Group { at, offered: now, sequence, from, next: NodeId(to), end: to + 1, first, size, payload: payload.clone() };
+                group.replace(next).into_iter().for_each(|group| traffic.schedule_group(group));
+            }
+            (outcome, _) => {
+                group.into_iter().for_each(|group| traffic.schedule_group(group));
+                return Some(Unusual { to: NodeId(to), sequence, outcome });
+            }
+        }
+    }
+    group.into_iter().for_each(|group| traffic.schedule_group(group));
+    None
+}
+
+/// Like [`schedule_groups`], for links of which some draw random numbers, so that each packet arrives at an instant of its own.
+///
+/// A function without a call that could change the network: the compiler then keeps in registers what is the same for all receivers (`benches/peers`, rows of
+/// watched packets).
+#[inline(never)]
+fn schedule_each<P: Clone>(row: &mut Row<P>, first: LinkId, traffic: &mut Traffic<P>, sent: &Sent<'_, P>, mut begin: u16) -> Option<Unusual> {
+    // Arrival of the packet before in this row. Its link has a lower number, so that a packet with an equal arrival follows it.
+    let mut before = None;
+    for lines in row[usize::from(begin)..].chunks_mut(usize::from(DRAWN_AT_ONCE)) {
+        // All draws for some receivers come before any other work. The draws do not depend on each other, so a processor can compute several at once.
+        let mut words = [[0; 2]; DRAWN_AT_ONCE as usize];
+        // The link from the node to itself has words as well, so words and links stay in step.
+        for (words, line) in words.iter_mut().zip(&*lines) {
+            *words = line.words();
+        }
+        for ((line, words), to) in lines.iter_mut().zip(words).zip((begin..).map(NodeId)).filter(|(_, to)| *to != sent.from) {
+            let sequence = line.offered();
+            match line.offer(sent.now, Some(words)) {
+                Outcome::Arrives(at) if at > sent.now => {
+                    traffic.schedule_after(before, at, link_to(first, to), sent.packet(to, sequence));
+                    before = Some(at);
+                }
+                outcome @ (Outcome::Arrives(_) | Outcome::Dropped(_) | Outcome::Enters) => return Some(Unusual { to, sequence, outcome }),
+            }
+        }
+        begin += DRAWN_AT_ONCE;
+    }
+    None
+}
