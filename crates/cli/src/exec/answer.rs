@@ -119,7 +119,7 @@ fn lost_in_words(lost: &LostPackets, nodes: &[&str]) -> String {
 }
 
 fn times(Count { failed, runs }: Count) -> String {
-    if failed == 0 { "passes".to_owned() } else { format!("fails {failed} times of {runs}") }
+    if failed == 0 { "passes".to_owned() } else { format!("fails {failed} of {runs} times") }
 }
 
 /// Describes the result of a search, or of equal runs.
@@ -139,6 +139,7 @@ pub(super) fn trials(arguments: &ExecArguments, plan: &Plan, trials: &Trials) ->
             Counted(trials.seeds.len() as u64, "seed")
         )),
         Verdict::Elsewhere => line("the command fails over ideal links too, so that the network is not the cause"),
+        Verdict::Repeated(Count { failed: 0, runs }) => line(&format!("the command passes {runs} of {runs} times")),
         Verdict::Repeated(count) => line(&format!("the command {}", times(*count))),
         Verdict::Lost(case, Count { failed: 0, runs }) => line(&format!(
             "seed {} has failed, and the loss of the same packets does not fail in {}: the cause may be a race in the command, or the instants of \

@@ -36,9 +36,11 @@ fn a_search_finds_the_lost_packet_behind_failed_seeds() {
     assert_eq!(outcome.status, Some(7), "{}\n{}", outcome.stdout, outcome.stderr);
     let lines: Vec<&str> = outcome.stdout.lines().collect();
     assert_eq!(lines[0], "losing nothing: passes");
-    let seeds: Vec<bool> = lines.iter().filter_map(|line| line.strip_prefix("seed ")).map(|line| line.contains(": fails with status 7, lost ")).collect();
+    let seeds: Vec<bool> =
+        lines.iter().filter_map(|line| line.strip_prefix("seed ")).map(|line| line.contains(": fails with status 7, lost ")).collect();
     assert!(seeds.len() == 4 && seeds.contains(&true), "{}", outcome.stdout);
-    let last = lines.iter().position(|line| *line == "the command fails 2 times of 2 if 1 packet is lost:").unwrap_or_else(|| panic!("{}", outcome.stdout));
+    let last =
+        lines.iter().position(|line| *line == "the command fails 2 of 2 times if 1 packet is lost:").unwrap_or_else(|| panic!("{}", outcome.stdout));
     // Nothing comes before packet 0 of a link, so that nothing is simpler.
     let line = lines[last + 1].trim();
     assert!(line.starts_with("cohaptic exec 'delay 1ms loss 15%' --lose '") && line.contains(": 0' -- "), "{line}");
@@ -63,20 +65,28 @@ fn a_search_says_what_is_not_due_to_lost_packets() {
     let desk = Desk::new();
     let outcome = desk.cohaptic("exec 'delay 1ms loss 1%' --seeds 1..9 --runs 2 --no-priority -- sh -c 'echo spoken; exit 3'");
     assert_eq!(outcome.status, Some(3), "{outcome:?}");
-    for part in ["losing nothing: fails 2 times of 2\nover ideal links: fails 2 times of 2\nthe command fails over ideal links too", "no packet has passed a link", "  | spoken\n"] {
+    for part in [
+        "losing nothing: fails 2 of 2 times\nover ideal links: fails 2 of 2 times\nthe command fails over ideal links too",
+        "no packet has passed a link",
+        "  | spoken\n",
+    ] {
         assert!(outcome.stdout.contains(part), "{}", outcome.stdout);
     }
     // The round trip of 200 ms is longer than the deadline of ping.
     let outcome = desk.cohaptic("exec 'delay 700ms loss 1%' --seeds 1..9 --runs 2 --no-priority -- timeout 1 ping -c 1 host");
     assert_eq!(outcome.status, Some(124), "{outcome:?}");
-    for part in ["over ideal links: passes\n", "the command fails 2 times of 2 without a lost packet:\n  cohaptic exec 'delay 700ms loss 1%' --lose none -- timeout 1 ping"] {
+    for part in [
+        "over ideal links: passes\n",
+        "the command fails 2 of 2 times without a lost packet:\n  cohaptic exec 'delay 700ms loss 1%' --lose none -- timeout 1 ping",
+    ] {
         assert!(outcome.stdout.contains(part), "{}", outcome.stdout);
     }
     let outcome = desk.cohaptic("exec 'delay 1ms loss 1%' --seeds 1..3 --no-priority --json -- true");
     let document = parse(&outcome.stdout);
     assert_eq!((outcome.status, &document["verdict"], document["seeds"].as_array().unwrap().len()), (Some(0), &json!("passed"), 3));
 
-    let mut command = desk.command("exec 'delay 1ms' --runs 100 --no-priority -- sh -c 'echo ready >>said; sleep 0.1; [ $(wc -l <said) -lt 3 ] || sleep 1000'");
+    let mut command =
+        desk.command("exec 'delay 1ms' --runs 100 --no-priority -- sh -c 'echo ready >>said; sleep 0.1; [ $(wc -l <said) -lt 3 ] || sleep 1000'");
     command.process_group(0);
     let running = Running::begin(command);
     while desk.files("").iter().all(|name| name != "said") || desk.read("said").lines().count() < 3 {

@@ -35,18 +35,31 @@ pub(super) fn reduce<E>(start: LostPackets, mut fails: impl FnMut(&LostPackets) 
     }
 }
 
-/// Returns the sets to be tried in place of a set, those that remove most first.
+/// Returns the sets to be tried in place of a set, the simplest first.
 fn candidates(of: &LostPackets) -> impl Iterator<Item = LostPackets> + '_ {
     let all: Vec<LostPacket> = of.iter().collect();
-    without_parts(all.clone())
+    std::iter::once(LostPackets::default())
+        .chain(single(of))
+        .chain(without_parts(all.clone()))
         .chain(all.clone().into_iter().map(move |gone| renumbered(of, gone)))
         .chain(all.into_iter().flat_map(move |packet| lowered(of, packet)))
 }
 
-/// Returns the sets without all packets, without each half, without each quarter and so on, down to the sets without one packet.
+/// Returns the sets of one packet with a low number, on the links of the set. Most failures need one packet, and these are few trials. A set of one packet has
+/// no such candidates: lower numbers are tried for every set.
+fn single(of: &LostPackets) -> impl Iterator<Item = LostPackets> + '_ {
+    let links = of.by_link();
+    let numbers = 0..if of.len() > 1 { LOW_NUMBERS } else { 0 };
+    numbers.flat_map(move |number| {
+        let packets: Vec<LostPacket> = links.iter().map(|((from, to), _)| LostPacket { from: *from, to: *to, number }).collect();
+        packets.into_iter().map(|packet| [packet].into_iter().collect())
+    })
+}
+
+/// Returns the sets without each half, without each quarter and so on, down to the sets without one packet.
 fn without_parts(all: Vec<LostPacket>) -> impl Iterator<Item = LostPackets> {
     let count = all.len();
-    let sizes = std::iter::successors(Some(count).filter(|count| *count > 0), |size| Some(size.div_ceil(2)).filter(|next| next < size));
+    let sizes = std::iter::successors(Some(count.div_ceil(2)).filter(|half| *half > 0), |size| Some(size.div_ceil(2)).filter(|next| next < size));
     sizes.flat_map(move |size| {
         let all = all.clone();
         (0..count).step_by(size).map(move |begin| {

@@ -71,6 +71,12 @@ fn the_smallest_set_is_the_first_syn() {
 fn packets_without_effect_go_and_later_ones_get_lower_numbers() {
     let fails = |set: &LostPackets| Ok::<_, ()>(three_connections(|number| set.contains(&LostPacket { from: 0, to: 1, number })).status != 0);
     assert_eq!(reduce(lost(&[2, 7]), fails).map(|set| numbers(&set)), Ok(vec![0]));
+    // The same 100 packets later, where no low number is a cause.
+    let later = |set: &LostPackets| {
+        let is_lost = |number| set.contains(&LostPacket { from: 0, to: 1, number: number + 100 });
+        Ok::<_, ()>(three_connections(is_lost).status != 0)
+    };
+    assert_eq!(reduce(lost(&[102, 107]), later).map(|set| numbers(&set)), Ok(vec![106]));
     // Fails if the packets 3 and 11 of one link and packet 4 of the other are lost, whatever else is.
     let needed: LostPackets = [(0, 1, 3), (0, 1, 11), (1, 0, 4)].map(|(from, to, number)| LostPacket { from, to, number }).into_iter().collect();
     let much: LostPackets = (0..40).flat_map(|number| [(0, 1), (1, 0)].map(|(from, to)| LostPacket { from, to, number })).collect();
