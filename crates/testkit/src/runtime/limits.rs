@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use cohaptic_units::Instant;
 use cohaptic_units::print::{Seconds, Span};
 
 use crate::core::{Core, Shared};
@@ -30,18 +31,25 @@ fn who_waits(core: &Core, tasks: &Tasks) -> String {
     text
 }
 
-/// Fails the run, because nothing will ever happen any more.
+/// Fails the run, because nothing will ever happen any more after `since`. With tokio, the clock may have jumped since then.
 ///
 /// # Panics
 ///
 /// Always.
 #[expect(clippy::panic, reason = "the program waits for ever; says who does, and the way out")]
-pub(super) fn nothing_will_happen(shared: &Shared, tasks: &Tasks) -> ! {
-    let (now, text) = shared.with(|core| (core.now(), who_waits(core, tasks)));
+pub(super) fn nothing_will_happen(shared: &Shared, tasks: &Tasks, since: Instant) -> ! {
+    let mut text = shared.with(|core| who_waits(core, tasks));
+    // A future of another program beside the tasks is not listed, and its waker belongs to another thread.
+    if text.is_empty() {
+        text.push_str(
+            "\n  nobody waits for a socket of the test bed. Another thread, such as one that holds a lock, does not count: run tests that share a lock one after \
+             the other (`RUST_TEST_THREADS=1`)",
+        );
+    }
     panic!(
         "nothing will ever happen after {} s: no packet is under way, no timer is set, and tasks still wait. Put a `timeout` around each wait for a packet \
          that may be lost. Who waits:{text}",
-        Seconds(now)
+        Seconds(since)
     );
 }
 

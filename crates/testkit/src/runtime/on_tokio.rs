@@ -62,7 +62,7 @@ struct Idle {
     moved: AtomicU64,
     /// Last instant of the run: its time limit.
     until: Instant,
-    /// Instant of tokio's last parking \[ns\].
+    /// Instant of tokio's last parking, before a jump to the timer for a run without a next event \[ns\].
     parked: AtomicU64,
     /// `true` if tokio is jumping to the timer for a run without a next event. Tokio's timers do not reach as far as [`NEVER`], so tokio takes several jumps.
     is_idle: AtomicBool,
@@ -94,16 +94,15 @@ impl Idle {
     /// Returns whether the run is beyond its time limit. Tasks of tokio alone may keep the run going, and the executor does not see such tasks.
     fn must_end(&self, core: &mut Core) -> bool {
         let (parked, now) = (self.parked.load(Ordering::Relaxed), core.now());
-        self.parked.store(now.as_nanos(), Ordering::Relaxed);
-        if now <= self.until {
-            return false;
-        }
+        let is_beyond = now > self.until;
         // A jump this long without a next event is taken for a jump to the timer for "no event". The run then fails as waiting for ever, not as beyond its
-        // limit.
-        if now.saturating_duration_since(Instant::from_nanos(parked)) > NEVER / 2 && core.next_event().is_none() {
+        // limit, and the message names the instant before the jump.
+        if is_beyond && now.saturating_duration_since(Instant::from_nanos(parked)) > NEVER / 2 && core.next_event().is_none() {
             self.is_idle.store(true, Ordering::Relaxed);
+        } else {
+            self.parked.store(now.as_nanos(), Ordering::Relaxed);
         }
-        !self.is_idle.load(Ordering::Relaxed)
+        is_beyond && !self.is_idle.load(Ordering::Relaxed)
     }
 
     /// Called when tokio is about to park its thread, because all tasks wait.
@@ -143,7 +142,12 @@ impl Idle {
             if is_due {
                 continue;
             }
-            let Some(to) = step(now, next) else { break };
+            let Some(to) = step(now, next) else {
+                if !self.is_idle.load(Ordering::Relaxed) {
+                    self.parked.store(now.as_nanos(), Ordering::Relaxed);
+                }
+                break;
+            };
             advance(to.saturating_duration_since(now));
             if floor(to) == to {
                 // Tokio's own timers of this millisecond go off first.
@@ -437,7 +441,7 @@ async fn pump(shared: &Shared, tasks: &Tasks, idle: &Idle, origin: tokio::time::
         }
         if timer.as_mut().poll(cx).is_ready() {
             if next.is_none() {
-                nothing_will_happen(shared, tasks);
+                nothing_will_happen(shared, tasks, Instant::from_nanos(idle.parked.load(Ordering::Relaxed)));
             }
             // The clock has reached the millisecond of the next event, or an earlier millisecond; the hook moves the clock on. The timer is set far away, so
             // as not to go off again.

@@ -297,7 +297,7 @@ impl Executor {
                 Some(Ok(core.now()))
             });
             now = match passed {
-                None => nothing_will_happen(shared, tasks),
+                None => nothing_will_happen(shared, tasks, now),
                 Some(Err(limit)) => goes_on(shared, tasks, limit),
                 Some(Ok(now)) => now,
             };
