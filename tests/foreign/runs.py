@@ -2,10 +2,10 @@
 
 import contextlib
 import json
-import multiprocessing
 import os
 import re
 import subprocess
+import sys
 import time
 from itertools import combinations
 
@@ -133,19 +133,13 @@ def failed(done, tests):
     return tests - set(re.findall(r"^test (\S+)(?: - should panic)? \.\.\. ok$", done.stdout, re.M))
 
 
-def compute():
-    while True:
-        pass
-
-
 @contextlib.contextmanager
 def load():
     """Other programs that compute meanwhile."""
-    burners = [multiprocessing.Process(target=compute, daemon=True) for _ in range(BURNERS)]
-    for burner in burners:
-        burner.start()
+    burners = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(BURNERS)]
     try:
         yield
     finally:
         for burner in burners:
-            burner.terminate()
+            burner.kill()
+            burner.wait()
