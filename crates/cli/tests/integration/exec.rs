@@ -558,6 +558,29 @@ fn a_signal_ends_a_run_whose_main_command_still_waits() {
     }
 }
 
+/// A command counts as killed if its host is killed while the command waits.
+#[test]
+fn a_host_that_is_killed_before_its_command_starts_fails_the_run() {
+    if !can_run() {
+        return;
+    }
+    let desk = Desk::new();
+    desk.write("net.toml", net("command = \"echo up >&2; sleep 5\"\nready = \"never\"", "command = \"echo started\"\nmain = true"));
+    let running = Running::begin(desk.command("exec net.toml --no-priority"));
+    running.said("server | up");
+    let parent = format!("\nPPid:\t{}\n", running.id());
+    let is_of_client = |pid: &String| {
+        let read = |file: &str| fs::read_to_string(format!("/proc/{pid}/{file}")).unwrap_or_default();
+        read("status").contains(&parent) && read("cmdline").contains("echo started")
+    };
+    let processes = fs::read_dir("/proc").unwrap().filter_map(|entry| entry.unwrap().file_name().into_string().ok());
+    let client: Vec<String> = processes.filter(is_of_client).collect();
+    assert_eq!(client.len(), 1, "{client:?}");
+    assert!(Command::new("kill").args(["-KILL", &client[0]]).status().unwrap().success());
+    let outcome = running.end();
+    assert_eq!((outcome.status, outcome.stdout.as_str()), (Some(137), ""), "{outcome:?}");
+}
+
 /// With a world, hosts of a file reach the real machine over the links to the world.
 #[test]
 fn a_file_may_have_the_real_world() {

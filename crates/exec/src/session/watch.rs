@@ -152,8 +152,11 @@ impl<'a> Watch<'a> {
                     Some((Told::Started | Told::Device(_), _)) => {}
                     Some((Told::Ended(status), _)) => self.end(place, status),
                     Some((Told::Failed(status, why), _)) => return Err(named(self.plan, plan, Failed { status, why })),
-                    // A signal ends process 1 without a report if its command has not started, and a run that is ending needs no report any more.
-                    None if self.states[place] == State::Waits || self.kill_at.is_some() => self.hosts[place] = None,
+                    // A run that is ending needs no report any more.
+                    None if self.kill_at.is_some() => self.hosts[place] = None,
+                    // Before the start process 1 reports nothing, so that something has killed it: the command counts as killed too, and not as one that has
+                    // succeeded.
+                    None if self.states[place] == State::Waits => self.end(place, signals::status(Signal::SIGKILL)),
                     None => return Err(named(self.plan, plan, Failed::own("the process inside has ended without a word".to_owned()))),
                 }
             }
