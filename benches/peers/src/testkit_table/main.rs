@@ -1,7 +1,7 @@
 //! Writes `docs/measured-testkit.md`: `cargo run --release > ../../docs/measured-testkit.md` in `benches/peers`. Takes some minutes.
 //!
 //! `--smoke` runs every row once with the least work: its figures say nothing. `udp` and `tcp` print the tables of one of them only, `fan-in` that
-//! of the hosts that write to one.
+//! of the hosts that write to one. `fan-in-once PLACE fresh` and `fan-in-once PLACE kept` run one subject of that table, by its place from 0 on.
 
 mod on_bare;
 mod on_testkit;
@@ -106,6 +106,11 @@ fn main() {
     let effort = if is_given("--smoke") { Effort { rounds: 1, divisor: 100 } } else { Effort { rounds: ROUNDS, divisor: 1 } };
     if is_given("fan-in") {
         return tcp::fan_in(effort);
+    }
+    if let [word, place, memory, ..] = &*arguments
+        && word == "fan-in-once"
+    {
+        return tcp::fan_in_once(effort, place.parse().expect("the place of a subject"), memory);
     }
     let idle = tcp::idle(effort);
     head();

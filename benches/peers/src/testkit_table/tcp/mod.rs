@@ -5,9 +5,10 @@ mod on_turmoil;
 mod on_turmoil_net;
 mod program;
 
+use std::process::Command;
 use std::time::Duration;
 
-use cohaptic_benches_peers::{median, version};
+use cohaptic_benches_peers::{median, seconds_of, version};
 use cohaptic_testkit::tcp::{CongestionControl, TcpConfig};
 
 use super::{Effort, rounds};
@@ -68,22 +69,71 @@ fn gigabyte(effort: Effort) {
     }
 }
 
+/// Hosts that write to one, and the delay of their links.
+const WRITERS: (u32, Duration) = (30, Duration::from_millis(1));
+
+/// Subjects of the hosts that write to one, with the figures that are asked for.
+const FAN_IN: [(&str, &str); 3] = [(OWN, "≤ 2×"), (TOKIO, "≤ 2.5×"), (TURMOIL, "")];
+
+/// Returns the number of octets that each host writes.
+fn octets_of_writer(effort: Effort) -> usize {
+    1000 * effort.part_of(500) as usize
+}
+
+/// Lets the hosts write to one, on the subject at a place of [`FAN_IN`].
+fn fan_in_on(place: usize, octets: usize) {
+    let (clients, delay) = WRITERS;
+    match place {
+        0 => on_testkit::fan_in(false, clients, delay, octets),
+        1 => on_testkit::fan_in(true, clients, delay, octets),
+        _ => on_turmoil::fan_in(clients, delay, octets),
+    }
+}
+
+/// Variables by which the allocator of the GNU C library gives no memory back to the system.
+const KEEPING: [(&str, &str); 2] = [("MALLOC_TRIM_THRESHOLD_", "1000000000"), ("MALLOC_MMAP_THRESHOLD_", "1000000000")];
+
+/// Word for runs with kept memory.
+const KEPT: &str = "kept";
+
+/// Prints the processor time \[s\] of a run of the hosts that write to one: of the first run of the process, or the mean of 20 runs after three others, if
+/// `memory` is the word [`KEPT`]. For a process that does nothing else.
+pub fn fan_in_once(effort: Effort, place: usize, memory: &str) {
+    let octets = octets_of_writer(effort);
+    let (before, measured) = if memory == KEPT { (3, 20) } else { (0, 1) };
+    (0..before).for_each(|_| fan_in_on(place, octets));
+    println!("{}", seconds_of(|| (0..measured).for_each(|_| fan_in_on(place, octets))) / f64::from(measured));
+}
+
+/// Returns what [`fan_in_once`] prints in a process of its own \[s\].
+fn time_alone(effort: Effort, place: usize, memory: &str) -> f64 {
+    let mut command = Command::new(std::env::current_exe().expect("the program has a file"));
+    command.args(["fan-in-once", &place.to_string(), memory]).args((effort.divisor > 1).then_some("--smoke"));
+    if memory == KEPT {
+        command.envs(KEEPING);
+    }
+    let output = command.output().expect("the program starts again");
+    String::from_utf8_lossy(&output.stdout).trim().parse().expect("the program prints a number")
+}
+
 /// Prints the table of the hosts that write to one.
 pub fn fan_in(effort: Effort) {
-    let (clients, octets) = (30, 1000 * effort.part_of(500) as usize);
-    println!("{clients} hosts each write {octets} octets, 65,536 a call, on a connection of their own to one server, over links of 1 ms.");
-    println!("turmoil carries each call as one message, without segments, acknowledgements and windows.\n");
-    println!("| | \\[ms\\] | against turmoil | asked for |");
-    println!("| --- | ---: | ---: | ---: |");
-    let delay = Duration::from_millis(1);
-    let rows: [Row<'_, _>; 3] = [
-        (OWN, "≤ 2×", &|| on_testkit::fan_in(false, clients, delay, octets)),
-        (TOKIO, "≤ 2.5×", &|| on_testkit::fan_in(true, clients, delay, octets)),
-        (TURMOIL, "", &|| on_turmoil::fan_in(clients, delay, octets)),
-    ];
-    let times = times(effort, &rows);
-    for ((subject, asked, _), time) in rows.iter().zip(&times) {
-        println!("| {subject} | {:.1} | {:.2}× | {asked} |", time * 1e3, time / times[2]);
+    let octets = octets_of_writer(effort);
+    println!("{} hosts each write {octets} octets, 65,536 a call, on a connection of their own to one server, over links of 1 ms.", WRITERS.0);
+    println!("turmoil carries each call as one message, without segments, acknowledgements and windows. Each run has a process of its own.");
+    println!("With *fresh* memory the run is the first of its process, as a test is: the system maps and clears the memory that the run takes.");
+    println!("With *kept* memory three runs came before and the allocator gave nothing back, so that the work alone counts; of 20 runs, the mean.");
+    println!("A ratio above the figure that is asked for misses it: a real TCP costs more than messages, and kept memory hides none of it.\n");
+    println!("| | fresh \\[ms\\] | against turmoil | kept \\[ms\\] | against turmoil | asked for |");
+    println!("| --- | ---: | ---: | ---: | ---: | ---: |");
+    let runs: Vec<(usize, &str)> = (0..FAN_IN.len()).flat_map(|place| [(place, "fresh"), (place, KEPT)]).collect();
+    let times: Vec<f64> = rounds(effort, &runs, |(place, memory)| time_alone(effort, place, memory))
+        .into_iter()
+        .map(|times| median(times.into_iter().map(|(_, time)| time).collect()))
+        .collect();
+    for ((subject, asked), times_of) in FAN_IN.iter().zip(times.chunks(2)) {
+        let [fresh, kept] = [0, 1].map(|memory| times_of[memory] / times[times.len() - 2 + memory]);
+        println!("| {subject} | {:.1} | {fresh:.2}× | {:.1} | {kept:.2}× | {asked} |", times_of[0] * 1e3, times_of[1] * 1e3);
     }
 }
 

@@ -82,7 +82,7 @@ pub fn connections(on_tokio: bool, count: u32, questions: u32) {
 /// If a connection gives an error.
 pub fn fan_in(on_tokio: bool, clients: u32, delay: Duration, octets: usize) {
     let names: Vec<String> = (0..clients).map(|number| format!("client{number}")).collect();
-    let bed = Testbed::new(names.iter().map(String::as_str).chain(["server"])).links(&format!("delay {}ns", delay.as_nanos()));
+    let bed = Testbed::new(names.iter().map(String::as_str).chain(["server"])).links(format!("delay {}ns", delay.as_nanos()));
     let bed = if on_tokio { bed.on_tokio() } else { bed };
     bed.run(|bed| async move {
         let server = bed.host("server");
