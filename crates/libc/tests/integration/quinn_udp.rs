@@ -1,7 +1,7 @@
 //! The sockets of quinn: `sendmsg` and `recvmmsg` with control messages.
 
 use std::io::IoSliceMut;
-use std::net::{IpAddr, UdpSocket};
+use std::net::{IpAddr, Ipv4Addr, UdpSocket};
 use std::time::Duration;
 
 use cohaptic_testkit::time::sleep;
@@ -60,19 +60,27 @@ fn a_datagram_leaves_by_the_interface_of_its_address() {
     Testbed::new(["phone", "server"]).interfaces("phone", ["wifi", "lte"]).run(async |bed: Bed| {
         let server = bed.host("server").spawn(async {
             let socket = UdpSocket::bind("0.0.0.0:7").unwrap();
+            socket.join_multicast_v4(&Ipv4Addr::new(224, 0, 0, 251), &Ipv4Addr::UNSPECIFIED).unwrap();
             sleep(Duration::from_millis(1)).await;
-            [(); 3].map(|()| socket.recv_from(&mut [0; 9]).unwrap().1.ip())
+            [(); 6].map(|()| socket.recv_from(&mut [0; 9]).unwrap().1.ip())
         });
         let phone = bed.host("phone");
         let sent = phone.clone().spawn(async move {
-            let [lte, wifi] = ["lte", "wifi"].map(|name| IpAddr::from(phone.uplink(name).v4));
-            let socket = UdpSocket::bind("0.0.0.0:0").unwrap();
-            let state = UdpSocketState::new((&socket).into()).unwrap();
-            for src_ip in [Some(lte), Some(wifi), None] {
-                let transmit = Transmit { destination: "10.0.0.2:7".parse().unwrap(), ecn: None, contents: b"hello", segment_size: None, src_ip };
+            let [lte, wifi] = ["lte", "wifi"].map(|name| phone.uplink(name).v4);
+            let send = |at: &str, to: &str, src_ip| {
+                let socket = UdpSocket::bind(at).unwrap();
+                let state = UdpSocketState::new((&socket).into()).unwrap();
+                let transmit = Transmit { destination: to.parse().unwrap(), ecn: None, contents: b"hello", segment_size: None, src_ip };
                 state.try_send((&socket).into(), &transmit).unwrap();
+            };
+            // The unspecified address names none.
+            for src_ip in [Some(lte), Some(wifi), Some(Ipv4Addr::UNSPECIFIED), None] {
+                send("0.0.0.0:0", "10.0.0.2:7", src_ip.map(IpAddr::from));
             }
-            [lte, wifi, wifi]
+            // A socket of IPv6 names an address of IPv4 in its own form.
+            send("[::]:0", "[::ffff:10.0.0.2]:7", Some(lte.to_ipv6_mapped().into()));
+            send("0.0.0.0:0", "224.0.0.251:7", Some(lte.into()));
+            [lte, wifi, wifi, wifi, lte, lte].map(IpAddr::from)
         });
         assert_eq!(server.await.unwrap(), sent.await.unwrap());
     });

@@ -109,6 +109,9 @@ mod tests {
         assert!(lives(&session, 7459));
         session.note(at(30), Way::In, Signs { rst: true, ..Signs::default() });
         assert_eq!([259, 260].map(|second| lives(&session, second)), [true, false]);
+        // A late SYN with ACK belongs to the connection that has ended.
+        session.note(at(40), Way::In, syn_ack);
+        assert!(!lives(&session, 260));
     }
 
     #[test]

@@ -130,6 +130,30 @@ fn the_message_that_nobody_listens_comes_back_to_the_interface() {
     });
 }
 
+/// A host does not hear itself over the network, and hears others once by each interface.
+#[test]
+fn each_interface_hears_a_broadcast_and_a_multicast_once() {
+    Testbed::new(["phone", "server"]).interfaces("phone", ["wifi", "lte"]).run(|bed| async move {
+        let sockets = ["phone", "server"].map(|name| bed.host(name).bind("0.0.0.0:5353").unwrap());
+        for socket in &sockets {
+            socket.set_broadcast(true).unwrap();
+            socket.join_multicast_v4([224, 0, 0, 251].into(), [0; 4].into()).unwrap();
+        }
+        for to in ["255.255.255.255:5353", "224.0.0.251:5353"] {
+            for (sender, expected) in sockets.iter().zip([[1, 1], [2, 1]]) {
+                sender.send_to(b"?", to).await.unwrap();
+                let mut heard = [0; 2];
+                for (socket, heard) in sockets.iter().zip(&mut heard) {
+                    while heard_from(socket).await.is_some() {
+                        *heard += 1;
+                    }
+                }
+                assert_eq!(heard, expected, "{to}");
+            }
+        }
+    });
+}
+
 #[cfg(feature = "tcp")]
 #[test]
 fn a_connection_stays_on_the_interface_of_its_address() {
@@ -187,6 +211,9 @@ fn interfaces_that_make_no_sense_are_refused() {
         ("host `a` cannot get interfaces: it is `n` or behind it", &|| drop(hosts().nat("n", "", ["a"]).interfaces("a", ["w"]))),
         ("host `a` has interfaces, and cannot be behind `n` itself", &|| drop(hosts().interfaces("a", ["w"]).nat("n", "", ["a"]))),
         ("`a` has no link to `b`", &|| hosts().interfaces("a", ["w"]).link("a", "b", "delay 1ms").run(nothing())),
+        ("`b` has no link to `a`", &|| hosts().interfaces("a", ["w"]).link("b", "a", "delay 1ms").run(nothing())),
+        ("`a` has no link to `b`", &|| hosts().interfaces("a", ["w"]).run(|bed| async move { bed.cut("a", "b") })),
+        ("`b` has no link to `a`", &|| hosts().interfaces("a", ["w"]).run(|bed| async move { bed.cut("b", "a") })),
         ("`w` is an interface of host `a`", &|| hosts().interfaces("a", ["w"]).run(|bed| async move { drop(bed.host("w")) })),
         ("host `a` has no interface `b`", &|| {
             hosts().interfaces("a", ["w"]).run(|bed| async move {

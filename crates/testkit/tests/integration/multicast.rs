@@ -123,6 +123,23 @@ fn multicast_stays_in_its_network() {
     });
 }
 
+/// As with Linux, nobody is told that a port is closed where many hosts were asked.
+#[test]
+fn a_closed_port_of_a_group_is_silent() {
+    Testbed::new(["a", "b"]).run(|bed| async move {
+        let [a, b] = ["a", "b"].map(|name| bed.host(name).bind("0.0.0.0:9").unwrap());
+        a.set_broadcast(true).unwrap();
+        b.join_multicast_v4(GROUP, ANY).unwrap();
+        for to in [TO, "255.255.255.255:5353"] {
+            a.connect(to).await.unwrap();
+            for _ in 0..2 {
+                a.send(b"?").await.unwrap();
+                time::sleep(Duration::from_millis(1)).await;
+            }
+        }
+    });
+}
+
 #[test]
 fn mistakes_are_those_of_linux() {
     Testbed::new(["a"]).run(|bed| async move {

@@ -94,8 +94,9 @@ fn all_ports_can_be_given_and_no_more() {
 #[test]
 fn memory_follows_the_mappings_that_are_alive() {
     let mut table = table("home udp-unanswered-timeout 1s");
-    for host in 0..1000 {
-        table.outbound(at(host.into()), &flow(endpoint(host, 1), endpoint(1, 7)), OUTER).unwrap();
+    // Each host has another port, so that no mapping takes over the port of an ended mapping.
+    for host in 0..1000_u16 {
+        table.outbound(at(host.into()), &flow(endpoint(host.into(), 1 + host), endpoint(1, 7)), OUTER).unwrap();
     }
     assert!(table.mappings.len() <= FEW + 1 && table.externals.len() == table.mappings.len());
     // The sessions of a mapping as well.
@@ -129,6 +130,23 @@ fn an_error_message_refreshes_nothing() {
     assert_eq!(table.error_out(at(9), &flow(inside, remote)), Ok(external));
     assert_eq!(table.error_in(at(10), &flow(remote, external)), Err(Lost::NoMapping));
     assert_eq!(table.error_out(at(10), &flow(inside, remote)), Err(Lost::NoMapping));
+    // The dropped message from outside counts as filtered.
+    assert_eq!(table.filtered, 1);
+}
+
+/// Packets after the end of a session begin a new session, also where another session has kept the mapping.
+#[test]
+fn an_ended_session_begins_anew() {
+    let [inside, one, other] = [endpoint(100, 5000), endpoint(1, 7), endpoint(2, 7)];
+    let mut table = table("home");
+    let external = table.outbound(at(0), &flow(inside, one), OUTER).unwrap();
+    table.inbound(at(1), &flow(one, external)).unwrap();
+    table.outbound(at(290), &flow(inside, other), OUTER).unwrap();
+    table.inbound(at(291), &flow(other, external)).unwrap();
+    // The first session has ended after 300 s. The new session has no answer yet, and lives for 30 s.
+    assert_eq!(table.outbound(at(310), &flow(inside, one), OUTER), Ok(external));
+    let remotes = |second| table.listed(at(second)).into_iter().flat_map(|(.., remotes)| remotes).collect::<Vec<_>>();
+    assert_eq!((remotes(339), remotes(340)), (vec![one, other], vec![other]));
 }
 
 #[test]

@@ -63,6 +63,17 @@ proptest! {
     }
 
     #[test]
+    fn ports_are_kept(network in networks_like(2, LinkBounds::ideal()).behind_nats([0])) {
+        if is_child("ports_are_kept") {
+            Testbed::new(["client", "server"]).network(&network).run(|bed| async move {
+                let [client, server] = ["client", "server"].map(|name| bed.host(name).bind("0.0.0.0:5000").unwrap());
+                client.send_to(b"?", "server:5000").await.unwrap();
+                assert_eq!(server.recv_from(&mut [0]).await.unwrap().1.port(), 5000);
+            });
+        }
+    }
+
+    #[test]
     fn nodes_hear_every_beat(network in networks_like(2, lossy())) {
         if is_child("nodes_hear_every_beat") {
             let link = network.links().next().unwrap().2.clone();
@@ -168,6 +179,13 @@ fn a_saved_failure_still_fails_when_hosts_links_and_their_order_change() {
         assert!(fails(with_calls(bed.clone(), test_in(&lost)), five_letters), "{bed:?}");
         assert!(fails(with_calls(bed.clone(), test_in(&mixed)), letters_in_order), "{bed:?}");
     }
+}
+
+/// The ports of a NAT follow from the seed.
+#[test]
+fn a_test_with_random_ports_of_a_nat_prints_its_seed() {
+    let text = printed("ports_are_kept", &[]);
+    assert!(test_in(&text).contains(".nat(\"nat-client\", \"") && test_in(&text).contains(".seed("), "{text}");
 }
 
 #[test]

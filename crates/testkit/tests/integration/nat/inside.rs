@@ -82,6 +82,9 @@ fn hosts_of_one_network_talk_without_their_nat() {
             assert!(!passes(&alice, to.parse().unwrap(), &bob).await, "{to}");
         }
         assert!(bed.nat("home-a").mappings().is_empty() && bed.nat("home-b").mappings().is_empty());
+        // IPv6 has no translation, so that the host itself knows that no way leads to another network.
+        let six = bind(&bed.host("alice"), "[::]:0").send_to(b"?", "[2001:db8::1]:53").await;
+        assert_eq!(six.unwrap_err().kind(), ErrorKind::NetworkUnreachable);
     });
 }
 
@@ -113,6 +116,10 @@ fn a_broadcast_stays_in_its_network() {
             heard.push(heard_from(socket).await.is_some());
         }
         assert_eq!(heard, [true, true, false, false]);
+        // A NAT beside the sender gets no broadcast either.
+        sockets[3].set_broadcast(true).unwrap();
+        sockets[3].send_to(b"?", "255.255.255.255:5000").await.unwrap();
+        assert_eq!(bed.link_stats("server", "carrier").offered(), 0);
     });
 }
 

@@ -145,6 +145,30 @@ fn the_message_that_nobody_listens_passes_the_nat() {
 }
 
 #[test]
+fn a_message_that_nobody_listens_keeps_no_mapping() {
+    let second = Duration::from_secs(1);
+    Testbed::new(["laptop", "server"]).nat("router", "home udp-timeout 100s", ["laptop"]).run(|bed| async move {
+        let [inside, server] = [("laptop", "0.0.0.0:5000"), ("server", "0.0.0.0:7")].map(|(name, at)| bind(&bed.host(name), at));
+        // From outside: the question to a closed port counts as unanswered, and its mapping ends after 30 s.
+        inside.send_to(b"?", "server:9").await.unwrap();
+        time::sleep(30 * second).await;
+        assert!(bed.nat("router").mappings().is_empty());
+        // From inside: the last packet of the socket left 29 s before.
+        inside.send_to(b"?", "server:7").await.unwrap();
+        let mapped = heard_from(&server).await.unwrap();
+        drop(inside);
+        time::sleep(29 * second).await;
+        server.connect(mapped).await.unwrap();
+        server.send(b"!").await.unwrap();
+        time::sleep(Duration::from_millis(1)).await;
+        assert_eq!(server.send(b"!").await.unwrap_err().kind(), std::io::ErrorKind::ConnectionRefused);
+        // An answered mapping lives for 100 s after the last packet of the socket. The message that nobody listens is no such packet.
+        time::sleep(71 * second).await;
+        assert!(bed.nat("router").mappings().is_empty());
+    });
+}
+
+#[test]
 fn links_without_delay_and_crowds_of_hosts_work() {
     let names: Vec<String> = (0..200).map(|host| format!("h{host}")).collect();
     let bed = Testbed::new(names.iter().cloned().chain(["server".to_owned()])).nat("router", "home", names.iter().map(|name| &**name)).seed(3);

@@ -5,7 +5,10 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use cohaptic_testkit::net::{TcpSocket, TcpStream};
-use cohaptic_testkit::{Bed, Happening, Host, Instant, Lost, NatProtocol, Testbed, time};
+use cohaptic_testkit::tcp::{Flags, TcpConfig};
+use cohaptic_testkit::units::Probability;
+use cohaptic_testkit::wan::{Chance, Checksum, Corruption, Flips, LinkConfig};
+use cohaptic_testkit::{Bed, Happening, Host, Instant, Lost, NatProtocol, Testbed, Trace, TraceEvent, time};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
 use super::lost;
@@ -29,6 +32,12 @@ async fn serve(bed: &Bed) -> (TcpStream, TcpStream) {
     let listener = bed.host("server").listen("0.0.0.0:80").unwrap();
     let client = bed.host("laptop").connect("server:80").await.unwrap();
     (client, listener.accept().await.unwrap().0)
+}
+
+/// Returns the number of resets that were sent.
+fn resets(trace: &Trace) -> usize {
+    let is_reset = |event: &&TraceEvent| matches!(event.what, Happening::Segment { flags, .. } if flags.has(Flags::RST));
+    trace.events().iter().filter(is_reset).count()
 }
 
 async fn passes(from: &mut TcpStream, to: &mut TcpStream) -> bool {
@@ -70,7 +79,7 @@ fn both_sides_open_at_once_through_two_homes() {
         assert!(passes(&mut alice, &mut bob).await && passes(&mut bob, &mut alice).await);
         // Her first SYN came too early. Nothing answers it, because bob's own SYN has followed.
         time::sleep(Duration::from_secs(10)).await;
-        assert_eq!(lost(&bed.trace(), Lost::NoMapping), 1);
+        assert_eq!((lost(&bed.trace(), Lost::NoMapping), resets(&bed.trace())), (1, 0));
         assert!(passes(&mut alice, &mut bob).await);
     });
 }
@@ -97,13 +106,7 @@ fn an_expired_connection_is_silent() {
         assert!(!passes(&mut server, &mut client).await);
         assert!(!passes(&mut client, &mut server).await);
         assert!(client.info().retransmissions > 0 && bed.nat("router").mappings().is_empty());
-        let resets = bed
-            .trace()
-            .events()
-            .iter()
-            .filter(|event| matches!(event.what, Happening::Segment { flags, .. } if flags.has(cohaptic_testkit::tcp::Flags::RST)))
-            .count();
-        assert_eq!(resets, 0);
+        assert_eq!(resets(&bed.trace()), 0);
     });
 }
 
@@ -143,6 +146,78 @@ fn a_listener_behind_an_open_nat_is_reached_through_a_mapping() {
         let (mut accepted, from) = listener.accept().await.unwrap();
         assert_eq!(from.ip().to_string(), "10.0.0.3");
         assert!(passes(&mut other, &mut accepted).await && passes(&mut accepted, &mut other).await);
+        // The connection is established for the NAT, and outlives the 240 s of a connection that opens.
+        time::sleep(Duration::from_secs(300)).await;
+        assert!(passes(&mut other, &mut accepted).await && passes(&mut accepted, &mut other).await);
+    });
+}
+
+/// Only a SYN that opens a connection is answered, and not the answer to a SYN from inside whose mapping is gone.
+#[test]
+fn a_late_answer_is_dropped_in_silence() {
+    let bed = Testbed::new(["laptop", "server"]).nat("router", "strict", ["laptop"]).link_both("router", "server", "delay 10ms");
+    bed.traced().run(|bed| async move {
+        let _listener = bed.host("server").listen("0.0.0.0:80").unwrap();
+        let opening = bed.host("laptop").spawn(open(bed.host("laptop"), "10.0.0.2:80"));
+        time::sleep(Duration::from_millis(15)).await;
+        bed.nat("router").forget();
+        let _client = opening.await.unwrap().unwrap();
+        time::sleep(Duration::from_secs(9)).await;
+        assert!(lost(&bed.trace(), Lost::NoMapping) > 0);
+        assert_eq!(resets(&bed.trace()), 0);
+    });
+}
+
+/// A host inside that opens a connection to the outside of its own NAT, where nothing is mapped, is not told.
+#[test]
+fn a_syn_that_turns_back_to_nobody_is_dropped_in_silence() {
+    Testbed::new(["laptop", "server"]).nat("router", "open", ["laptop"]).traced().run(|bed| async move {
+        let opening = open(bed.host("laptop"), "10.0.0.3:80");
+        assert!(time::timeout(Duration::from_secs(10), opening).await.is_err());
+        assert_eq!(resets(&bed.trace()), 0);
+    });
+}
+
+/// A mark of the link before a NAT or a firewall reaches the receiver, which tells the sender.
+#[test]
+fn a_mark_stays_on_its_segment() {
+    for is_nat in [true, false] {
+        let bed = Testbed::new(["laptop", "server"]).tcp(TcpConfig { ecn: true, ..TcpConfig::default() }).seed(1);
+        let bed = if is_nat { bed.nat("router", "home", ["laptop"]) } else { bed.firewall("router", "", ["laptop"]) };
+        bed.link_both("laptop", "router", "delay 10ms").link("laptop", "router", "delay 10ms loss 2% ecn").run(|bed| async move {
+            let (mut client, mut server) = serve(&bed).await;
+            let writing = bed.host("laptop").spawn(async move {
+                client.write_all(&[7; 500_000]).await.unwrap();
+                // The buffer takes much of the data before a mark is reported.
+                time::sleep(Duration::from_secs(5)).await;
+                client.info()
+            });
+            server.read_exact(&mut [0; 500_000]).await.unwrap();
+            let info = writing.await.unwrap();
+            let stats = bed.link_stats("laptop", "router");
+            // No segment was lost, so that only marks can have slowed the sender down.
+            assert!(stats.marked() > 0 && stats.dropped_in_all() == 0 && info.slow_start_threshold < u32::MAX, "{info:?}");
+        });
+    }
+}
+
+/// A damaged segment has no ports that could be believed, and makes no mapping.
+#[test]
+fn a_damaged_segment_ends_at_the_nat() {
+    let bits = Flips::Bits { packets: Chance::independent(Probability::new(0.1).unwrap()), count: 1 };
+    let flips = LinkConfig { corruption: Some(Corruption { bits, within: None, checksum: Checksum::Passes }), ..LinkConfig::default() };
+    let bed = Testbed::new(["laptop", "server"]).nat("router", "home", ["laptop"]).link("laptop", "router", flips);
+    bed.traced().run(|bed| async move {
+        let (mut client, mut server) = serve(&bed).await;
+        let writing = bed.host("laptop").spawn(async move {
+            client.write_all(&[7; 300_000]).await.unwrap();
+            client
+        });
+        server.read_exact(&mut [0; 300_000]).await.unwrap();
+        let _client = writing.await.unwrap();
+        assert!(lost(&bed.trace(), Lost::Checksum) > 0);
+        let protocols: Vec<NatProtocol> = bed.nat("router").mappings().iter().map(|mapping| mapping.protocol).collect();
+        assert_eq!(protocols, [NatProtocol::Tcp]);
     });
 }
 
