@@ -164,15 +164,18 @@ impl Asked {
 
 fn autocorrelation(config: &LinkConfig, every: Duration) -> Vec<f64> {
     let (Some(law), Some(jitter)) = (config.delay.law(), config.delay.jitter()) else { return Vec::new() };
-    let phi = match jitter.correlation {
-        Correlation::None => 0.0,
-        Correlation::PerPacket(rho) => law.gaussian_correlation(rho).unwrap_or(0.0),
-        Correlation::InTime(tau) => libm::exp(-every.as_secs_f64() / tau.as_secs_f64()),
+    let in_time = |time: Duration| libm::exp(-every.as_secs_f64() / time.as_secs_f64());
+    // Correlation of the normal numbers of two packets in a row, without the share that differs from packet to packet, and the other share.
+    let (phi, share) = match jitter.correlation {
+        Correlation::None => (0.0, 1.0),
+        Correlation::PerPacket(rho) => (law.gaussian_correlation(rho).unwrap_or(0.0), 1.0),
+        Correlation::InTime(time) => (in_time(time), 1.0),
+        Correlation::PartlyInTime { time, share } => (in_time(time), share),
     };
     if phi == 0.0 {
         return (1..=LAGS).map(|_| 0.0).collect();
     }
-    (1..=LAGS).map(|lag| law.correlation(libm::pow(phi, f64::from(lag)))).collect()
+    (1..=LAGS).map(|lag| law.correlation(share * libm::pow(phi, f64::from(lag)))).collect()
 }
 
 #[cfg(test)]

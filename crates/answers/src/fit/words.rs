@@ -69,8 +69,14 @@ fn estimated(scene: &str, estimate: &Estimate) -> String {
         Some(correlation) => {
             let [time, lag] = [correlation.time_se_s.map(milliseconds), correlation.lag_one_se.map(|error| format!("{error:.5}"))]
                 .map(|error| error.map_or_else(String::new, |error| format!(" +- {error}")));
+            let share = if correlation.share < 1.0 {
+                let error = correlation.share_se.map_or_else(String::new, |error| format!(" +- {error:.5}"));
+                format!(" of the share {:.5}{error} of the variance; the rest differs from packet to packet", correlation.share)
+            } else {
+                String::new()
+            };
             line(format!(
-                "\ncorrelation time {}{time}, normal scores of neighbours {:.5}{lag}",
+                "\ncorrelation time {}{time}{share}, normal scores of neighbours {:.5}{lag}",
                 milliseconds(correlation.time_s),
                 correlation.lag_one
             ));

@@ -263,3 +263,25 @@ fn what_cannot_be_estimated_is_refused() {
         desk.cohaptic(line).assert_refused(status, &[part]);
     }
 }
+
+/// A level that stays for 2 s, with 60 % of the variance, and a jitter of each packet on top. 40 000 packets every 10 ms have 100 independent levels, so that the
+/// share is known to about 0.07, and the time to a factor of 1.3.
+#[test]
+fn a_share_with_memory_is_found_again() {
+    let desk = Desk::new();
+    let jitter = "jitter={sd=\"4ms\",distribution=\"gamma\",floor=\"30ms\",correlation-time=\"2s\",correlation-share=0.6}";
+    desk.text(&format!("link delay=40ms {jitter} --packets 40000 --every 10ms --fates f.csv"));
+    let document = desk.json("fit f.csv --json --out link.toml");
+    let jitter = &document["link"]["jitter"];
+    let (share, time) = (number(&jitter["correlation_share"]), number(&jitter["correlation_time_s"]));
+    assert!((share - 0.6).abs() < 4.5 * 0.07 && (time / 2.0).ln().abs() < 4.5 * 0.26, "{jitter:#}");
+    let fitted = &document["goodness"]["correlation"];
+    assert_eq!((number(&fitted["share"]), number(&fitted["time_s"])), (share, time));
+    assert!((share - 0.6).abs() < 4.5 * number(&fitted["share_se"]), "{fitted:#}");
+    // The correlation of neighbours 10 ms apart, of a normal law.
+    let asked = desk.json("link delay=40ms jitter={sd=\"4ms\",correlation-time=\"2s\",correlation-share=0.6} --packets 1000 --every 10ms --json");
+    assert!((number(&asked["asked"]["autocorrelation"][0]) - 0.6 * (-0.005_f64).exp()).abs() < 1e-6, "{asked:#}");
+    assert!(desk.read("link.toml").contains("correlation-share = 0."), "{}", desk.read("link.toml"));
+    let text = desk.text("fit f.csv");
+    assert!(text.contains(" of the share 0.") && text.contains("of the variance; the rest differs from packet to packet"), "{text}");
+}

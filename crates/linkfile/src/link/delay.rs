@@ -57,9 +57,15 @@ fn read_jitter(node: &Node, context: Context<'_>) -> Option<Read> {
     Some(Read { jitter, own_mean: own.map(|(mean, _)| mean) })
 }
 
-/// Reads `correlation` (per packet) or `correlation-time`. Both together are a fault.
+/// Reads `correlation` (per packet) or `correlation-time` with `correlation-share`. Both memories together are a fault.
 fn read_correlation(table: &mut TableReader<'_>, node: &Node, context: Context<'_>) -> Option<Correlation> {
     let (per_packet, in_time) = (table.entry("correlation"), table.entry("correlation-time"));
+    table.only_if(
+        in_time.is_some(),
+        "correlation-share",
+        "correlation-share means nothing without a memory in time: expected a key correlation-time too",
+    )?;
+    let share: Option<f64> = table.value("correlation-share");
     if per_packet.is_none() && in_time.is_none() {
         return Some(Correlation::None);
     }
@@ -68,7 +74,10 @@ fn read_correlation(table: &mut TableReader<'_>, node: &Node, context: Context<'
         let correlation = values::of_key(table.key("correlation"), &chosen.node, context)?;
         return Some(if correlation == 0.0 { Correlation::None } else { Correlation::PerPacket(correlation) });
     }
-    values::of_key(table.key("correlation-time"), &chosen.node, context).map(Correlation::InTime)
+    let time = values::of_key(table.key("correlation-time"), &chosen.node, context);
+    // One memory of the whole variation has one form, whether the file says so or not.
+    let (time, share) = (time?, share?);
+    Some(if share < 1.0 { Correlation::PartlyInTime { time, share } } else { Correlation::InTime(time) })
 }
 
 /// Rounds nanoseconds to a duration. The delays of a file lie between 0 and 9·10¹⁸ ns, and so do mean and standard deviation.

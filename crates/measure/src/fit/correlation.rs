@@ -8,10 +8,13 @@
 //! ```text
 //! ln L(τ) = Σ −½·ln(1 − φ²) − (z' − φz)²/(2(1 − φ²)) + z'²/2      (0 for independent delays)
 //! ```
+//!
+//! Where the delays say so clearly, only a share of the variation has the memory: see [`partial_memory`].
 
 use serde::Serialize;
 
 use super::law::normal_quantile;
+use super::partial_memory;
 use super::search::{maximise, standard_error};
 use crate::series::{NORMAL_975, count};
 
@@ -24,7 +27,12 @@ pub struct CorrelationFit {
     /// reach the farther end of the interval of ln τ. `None` if the likelihood is flat.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_se_s: Option<f64>,
-    /// Correlation of the normal scores over the typical spacing Δ of packets: e^{−Δ/τ}.
+    /// Share s of the variance of the normal scores that has this memory, at most 1. The rest differs from packet to packet.
+    pub share: f64,
+    /// Standard error of `share`; `None` for a share of 1, or if the likelihood is flat.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub share_se: Option<f64>,
+    /// Correlation of the normal scores over the typical spacing Δ of packets: s·e^{−Δ/τ}.
     pub lag_one: f64,
     /// Standard error of `lag_one`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -37,10 +45,16 @@ pub struct CorrelationFit {
 const SIGNIFICANT: f64 = 6.634_896_601_021_213;
 
 /// Fits the correlation time. `arrivals` are (sending, delay) \[s\] in the order of sending; `spacing` is the typical gap \[s\], not zero. Returns `None`
-/// if the delays do not differ significantly from independent delays. Also returns the innovations (z' − φz)/√(1 − φ²), which are independent if the correlation
-/// time is all of the memory.
+/// if the delays do not differ significantly from independent delays. Also returns the innovations, such as (z' − φz)/√(1 − φ²), which are independent if the
+/// correlation time is all of the memory.
 pub(super) fn fit(arrivals: &[(f64, f64)], spacing: f64) -> Option<(CorrelationFit, Vec<f64>)> {
     let scores = normal_scores(&arrivals.iter().map(|arrival| arrival.1).collect::<Vec<_>>());
+    let of_all = of_all(arrivals, &scores, spacing);
+    partial_memory::fit(arrivals, &scores, spacing, of_all.as_ref().map_or(0.0, |(fit, _)| fit.likelihood_ratio)).or(of_all)
+}
+
+/// Fits the correlation time of all of the variation.
+fn of_all(arrivals: &[(f64, f64)], scores: &[f64], spacing: f64) -> Option<(CorrelationFit, Vec<f64>)> {
     // Packets sent at the same instant tell nothing about time.
     let steps: Vec<[f64; 3]> = arrivals
         .windows(2)
@@ -75,13 +89,20 @@ pub(super) fn fit(arrivals: &[(f64, f64)], spacing: f64) -> Option<(CorrelationF
     let innovations = steps.iter().map(innovation).collect();
     let fit = CorrelationFit {
         time_s,
-        time_se_s: relative_error.map(|error| (NORMAL_975 * error).exp_m1() / NORMAL_975 * time_s),
+        time_se_s: relative_error.map(|error| error_of_time(time_s, error)),
+        share: 1.0,
+        share_se: None,
         lag_one,
         // By dφ/d ln τ = φ·Δ/τ.
         lag_one_se: relative_error.map(|error| error * lag_one * spacing / time_s),
         likelihood_ratio,
     };
     Some((fit, innovations))
+}
+
+/// Returns the standard error of a time whose logarithm has the standard error `relative`: 1.96 errors reach the farther end of the interval.
+pub(super) fn error_of_time(time_s: f64, relative: f64) -> f64 {
+    (NORMAL_975 * relative).exp_m1() / NORMAL_975 * time_s
 }
 
 /// Returns ln L with an estimated variance of z, up to a constant. Only this curvature tells the real error, because normal scores have the scale of the
@@ -95,7 +116,7 @@ fn profile(steps: &[[f64; 3]], time: f64) -> f64 {
 }
 
 /// Returns the normal scores Φ⁻¹((rank − ½)/n). Equal values share the mean of their ranks.
-fn normal_scores(values: &[f64]) -> Vec<f64> {
+pub(super) fn normal_scores(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&one, &other| values[one].total_cmp(&values[other]));
     let mut scores = vec![0.0; values.len()];

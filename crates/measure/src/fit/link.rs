@@ -53,9 +53,13 @@ pub struct FittedJitter {
     /// [`Goodness::correlation`](super::Goodness::correlation). Present only for evenly spaced packets.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correlation: Option<f64>,
-    /// Time in which the autocorrelation falls to 1/e \[s\]. Present only for packets that are not evenly spaced.
+    /// Time in which the autocorrelation falls to 1/e \[s\]. Present only for packets that are not evenly spaced, or for a share of the variation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correlation_time_s: Option<f64>,
+    /// Share of the variation that has the memory of `correlation_time_s`, above 0 and below 1; the rest differs from packet to packet. `None` if all of the
+    /// variation has the memory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correlation_share: Option<f64>,
 }
 
 impl FittedLink {
@@ -74,7 +78,8 @@ impl FittedLink {
         let floor = jitter.floor_s.map(|floor| format!(", floor = \"{}\"", duration(floor)));
         let correlation = jitter.correlation.map(|correlation| format!(", correlation = {}", number(correlation)));
         let time = jitter.correlation_time_s.map(|time| format!(", correlation-time = \"{}\"", duration(time)));
-        keys.extend([floor, correlation, time].into_iter().flatten());
+        let share = jitter.correlation_share.map(|share| format!(", correlation-share = {}", number(share)));
+        keys.extend([floor, correlation, time, share].into_iter().flatten());
         // Writing to a `String` cannot fail.
         let _ = writeln!(text, "jitter = {{ {keys} }}");
         let loss = match self.loss {
@@ -132,6 +137,7 @@ mod tests {
             floor_s: Some(0.02),
             correlation: Some(0.9),
             correlation_time_s: None,
+            correlation_share: None,
         },
         loss: LossModel::GilbertElliott { p: 0.01, r: 1.0 / 3.0, h: 0.0, k: 1.0 },
     };
@@ -165,12 +171,19 @@ mod tests {
             LossModel::GilbertElliottInTime { mean_good_s: 12.5, mean_bad_s: 1e300 },
         ];
         for loss in models {
-            let jitter = FittedJitter { correlation: None, correlation_time_s: Some(1.0 / 3.0), floor_s: None, ..LINK.jitter };
+            let jitter = FittedJitter {
+                correlation: None,
+                correlation_time_s: Some(1.0 / 3.0),
+                correlation_share: Some(2.0 / 3.0),
+                floor_s: None,
+                ..LINK.jitter
+            };
             let text = FittedLink { loss, jitter, ..LINK }.to_scene_toml("");
             let table: toml::Table = text.parse().unwrap();
             let link = table["link"].as_table().unwrap();
             let span = |value: &toml::Value| cohaptic_units::parse::duration(value.as_str().unwrap()).unwrap().as_secs_f64();
             assert_eq!(span(&link["jitter"]["correlation-time"]), 0.333_333_333);
+            assert_eq!(link["jitter"]["correlation-share"].as_float(), Some(0.666_667));
             match loss {
                 LossModel::None => assert!(!link.contains_key("loss")),
                 LossModel::Independent { probability } => assert_eq!(link["loss"].as_float(), Some(probability)),

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! CSV ─────────┐                       ┌─► law of the delay: six families, floor, AIC, Kolmogorov's distance, or the delays themselves
-//!              ├─► Measurements ─ fit ─┼─► its memory: correlation time of an Ornstein–Uhlenbeck process
+//!              ├─► Measurements ─ fit ─┼─► its memory: correlation time of an Ornstein–Uhlenbeck process, or of a share of the variation
 //! captures ────┘   (offset, skew)      └─► loss: independent or in bursts, BIC
 //! ```
 //!
@@ -29,6 +29,7 @@ mod link;
 mod link_delay;
 mod loss;
 mod measurements;
+mod partial_memory;
 mod rate_walk;
 pub mod readers;
 mod search;
@@ -254,8 +255,12 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
         sd_s: delay.sd_s,
         distribution: delay.distribution,
         floor_s: delay.floor_s,
-        correlation: correlation.filter(|_| evenly_spaced).map(|fit| delay.law.as_ref().map_or(fit.lag_one, |law| law.correlation(fit.lag_one))),
-        correlation_time_s: correlation.filter(|_| !evenly_spaced).map(|fit| fit.time_s),
+        correlation: correlation
+            .filter(|fit| evenly_spaced && fit.share >= 1.0)
+            .map(|fit| delay.law.as_ref().map_or(fit.lag_one, |law| law.correlation(fit.lag_one))),
+        // A share has a memory in time only, whatever the spacing.
+        correlation_time_s: correlation.filter(|fit| !evenly_spaced || fit.share < 1.0).map(|fit| fit.time_s),
+        correlation_share: correlation.map(|fit| fit.share).filter(|share| *share < 1.0),
     };
     let goodness = Goodness {
         packets: packets.len(),

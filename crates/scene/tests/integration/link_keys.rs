@@ -84,6 +84,9 @@ fn every_law_and_memory_of_jitter_is_read() {
     let text = |key| format!("{{ sd = \"2ms\", distribution = \"gamma\", floor = \"20ms\", {key} }}");
     assert_eq!(jitter(&text("correlation = 0.25")), remembering(Correlation::PerPacket(0.25)));
     assert_eq!(jitter(&text("correlation-time = \"50ms\"")), remembering(Correlation::InTime(50 * MS)));
+    let partly = remembering(Correlation::PartlyInTime { time: 50 * MS, share: 0.6 });
+    assert_eq!(jitter(&text("correlation-time = \"50ms\", correlation-share = 0.6")), partly);
+    assert_eq!(jitter(&text("correlation-time = \"50ms\", correlation-share = 1")), remembering(Correlation::InTime(50 * MS)));
     assert_eq!(jitter(&text("correlation = 0")), remembering(Correlation::None));
     let table = Distribution::Table(Arc::new(DistTable::parse(&data("steps.dist")).unwrap()));
     assert_eq!(jitter("{ sd = \"2ms\", distribution = { table = \"steps.dist\" } }"), Jitter::new(2 * MS, table));
@@ -405,6 +408,14 @@ fn what_cannot_be_is_refused_with_the_reason() {
         (
             "jitter = { sd = \"1ms\", correlation = 0.1, correlation-time = \"1s\" }",
             "6:43: link.jitter.correlation-time: \"correlation\" was given before",
+        ),
+        (
+            "jitter = { sd = \"1ms\", correlation-share = 0.5 }",
+            "6:44: link.jitter.correlation-share: correlation-share means nothing without a memory in time: expected a key correlation-time too",
+        ),
+        (
+            "delay = \"24ms\"\njitter = { sd = \"1ms\", correlation-time = \"1s\", correlation-share = 0 }",
+            "7:10: link.jitter: found the share 0 of the variance with memory: expected a number above 0 and at most 1",
         ),
         ("jitter = { sd = \"1ms\", correlation = 1 }", "6:38: link.jitter.correlation: 1 is out of range: expected a number from -1 to below 1"),
         (

@@ -245,7 +245,7 @@ fn with_jitter(option: &'static str, mean: Duration, spec: &JitterSpec, tables: 
             let largest = if matches!(spec.distribution, None | Some(Distribution::Uniform)) { mean } else { largest };
             ExactError::BelowZero { option, law, mean, jitter: spec.time, largest }
         }
-        DelayError::FloorAboveMean { .. } | DelayError::Correlation { .. } | DelayError::NoTime | DelayError::TooLong => {
+        DelayError::FloorAboveMean { .. } | DelayError::Correlation { .. } | DelayError::NoTime | DelayError::Share(_) | DelayError::TooLong => {
             ExactError::Delay { option, reason }
         }
     })

@@ -15,7 +15,7 @@ use stage::count;
 pub(crate) use stage::{CorrelatedDelays, DelayStage};
 
 use crate::laws::delay::{Distribution, Law, LawError};
-use crate::parameters::{CORRELATION, Choices, Form, Key, Table, number, optional, usual, words};
+use crate::parameters::{CORRELATION, Choices, FRACTION, Form, Key, Table, number, optional, usual, words};
 
 /// Random variation of the delay around its mean.
 #[derive(Clone, PartialEq, Debug)]
@@ -42,6 +42,14 @@ pub enum Correlation {
     /// Correlation time τ, with φ = e^(−Δ/τ) for packets Δ apart. The chain is an Ornstein–Uhlenbeck process, and the speed of change of the delay does not
     /// depend on the number of packets. If τ is far above the spacing of packets, packets rarely overtake each other.
     InTime(Duration),
+    /// Two memories. A share of the variance of the Gaussian numbers is an Ornstein–Uhlenbeck process as under [`InTime`](Self::InTime), and the rest is drawn
+    /// anew for each packet: z(n) = √s·u(n) + √(1−s)·η(n). The correlation of z over Δ is s·e^(−Δ/τ).
+    PartlyInTime {
+        /// Correlation time τ of the process.
+        time: Duration,
+        /// Share s of the process in the variance, above 0 and at most 1.
+        share: f64,
+    },
 }
 
 impl Jitter {
@@ -72,7 +80,18 @@ struct Checked {
 enum Memory {
     None,
     PerPacket(f64),
-    InTime { tau_nanos: f64 },
+    /// A chain in time. `parts` are the factors √s of the chain's value and √(1−s) of an independent normal number; the second is 0 without such a number.
+    InTime {
+        tau_nanos: f64,
+        parts: [f64; 2],
+    },
+}
+
+impl Memory {
+    /// Returns a chain with the correlation time `time`, not zero, and with the share `share` of the variance.
+    fn in_time(time: Duration, share: f64) -> Self {
+        Self::InTime { tau_nanos: nanos(time), parts: [libm::sqrt(share), libm::sqrt(1.0 - share)] }
+    }
 }
 
 /// Reason for the refusal of a delay.
@@ -108,6 +127,8 @@ pub enum DelayError {
     },
     /// The correlation time is zero.
     NoTime,
+    /// The share of the variance with memory is not above 0 and at most 1.
+    Share(f64),
     /// The mean exceeds 292 years, the longest span in signed nanoseconds, or the deviation exceeds half of this span.
     TooLong,
 }
@@ -131,6 +152,7 @@ impl fmt::Display for DelayError {
                 "delays with this law cannot have the correlation {asked} from one packet to the next: expected {least:.6} or more, and less than 1"
             ),
             Self::NoTime => f.write_str("a correlation time of 0s: expected a time above zero, or no correlation"),
+            Self::Share(found) => write!(f, "found the share {found} of the variance with memory: expected a number above 0 and at most 1"),
             Self::TooLong => f.write_str("a delay and its deviation must be below 292 years"),
         }
     }
@@ -162,8 +184,11 @@ impl Delay {
         let law = Law::new(&jitter.distribution, nanos(mean), nanos(jitter.sd), Some(nanos(jitter.floor))).map_err(explained)?;
         let memory = match jitter.correlation {
             Correlation::None => Memory::None,
-            Correlation::InTime(tau) if tau.is_zero() => return Err(DelayError::NoTime),
-            Correlation::InTime(tau) => Memory::InTime { tau_nanos: nanos(tau) },
+            Correlation::InTime(Duration::ZERO) | Correlation::PartlyInTime { time: Duration::ZERO, .. } => return Err(DelayError::NoTime),
+            Correlation::InTime(time) => Memory::in_time(time, 1.0),
+            // NaN fails both comparisons and is refused here.
+            Correlation::PartlyInTime { share, .. } if !(share > 0.0 && share <= 1.0) => return Err(DelayError::Share(share)),
+            Correlation::PartlyInTime { time, share } => Memory::in_time(time, share),
             // NaN fails both comparisons and is refused here. The law refuses correlations below its least possible correlation.
             Correlation::PerPacket(rho) if !(rho > -2.0 && rho < 1.0) => return Err(DelayError::Correlation { asked: rho, least: -1.0 }),
             Correlation::PerPacket(rho) => match law.gaussian_correlation(rho).map_err(explained)? {
@@ -230,6 +255,12 @@ static JITTER_TABLE: Table = Table::of(&[&[
     usual("floor", Form::Duration, "\"0s\"", "Smallest delay of a packet"),
     usual("correlation", number(CORRELATION), "0", "Correlation between the delays of successive packets"),
     optional("correlation-time", Form::PositiveDuration, "Time constant of the memory of delays, in place of correlation"),
+    usual(
+        "correlation-share",
+        number(FRACTION),
+        "1",
+        "With correlation-time: share of the variation that has this memory; the rest differs from packet to packet",
+    ),
 ]]);
 const LAWS: [(&str, &str); 8] = words(&Distribution::CHOICES);
 
@@ -262,6 +293,7 @@ impl Delay {
             Correlation::None => String::new(),
             Correlation::PerPacket(correlation) => format!(", correlation {correlation} from packet to packet"),
             Correlation::InTime(time) => format!(", correlated over {}", Span(*time)),
+            Correlation::PartlyInTime { time, share } => format!(", {share} of the variance correlated over {}", Span(*time)),
         };
         format!("{mean}, {} jitter of {}{floor}{memory}", distribution.words(), Span(*sd))
     }
@@ -290,6 +322,11 @@ mod tests {
             assert!(matches!(refused(jitter(Distribution::LogNormal, correlation)), DelayError::Correlation { .. }), "{correlation:?}");
         }
         assert_eq!(refused(jitter(Distribution::Normal, Correlation::InTime(Duration::ZERO))), DelayError::NoTime);
+        let partly = |time, share| refused(jitter(Distribution::Normal, Correlation::PartlyInTime { time, share }));
+        assert_eq!(partly(Duration::ZERO, 0.5), DelayError::NoTime);
+        for share in [0.0, -0.1, 1.5, f64::NAN] {
+            assert!(matches!(partly(MILLISECOND, share), DelayError::Share(_)), "{share}");
+        }
         let floor = Jitter { floor: 2 * MILLISECOND, ..jitter(Distribution::Normal, Correlation::None) };
         assert!(matches!(refused(floor), DelayError::FloorAboveMean { .. }));
     }

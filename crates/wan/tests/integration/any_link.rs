@@ -320,7 +320,7 @@ pub(crate) fn any_outages() -> BoxedStrategy<Outages> {
         .boxed()
 }
 
-/// Every law, independent and with both memories. Some take milliseconds to make, so they are made once.
+/// Every law, independent and with both memories, and two laws with a memory of a share. Some take milliseconds to make, so they are made once.
 pub(crate) static JITTERS: LazyLock<Vec<Delay>> = LazyLock::new(|| {
     use Distribution::{Gamma, Laplace, LogNormal, Normal, Pareto, ParetoNormal, Uniform, Weibull};
     let values = Empirical::new(vec![0.0, 1.0, 2.0, 3.0, 10.0]).unwrap();
@@ -335,6 +335,11 @@ pub(crate) static JITTERS: LazyLock<Vec<Delay>> = LazyLock::new(|| {
                 delays.push(Delay::with_jitter(micros(mean), jitter).unwrap());
             }
         }
+    }
+    // At the end, because other tests find delays by their place.
+    for distribution in [Gamma, Normal] {
+        let correlation = Correlation::PartlyInTime { time: micros(10), share: 0.6 };
+        delays.push(Delay::with_jitter(micros(40), Jitter { correlation, ..Jitter::new(micros(12), distribution) }).unwrap());
     }
     delays
 });

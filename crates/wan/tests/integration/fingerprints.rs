@@ -183,6 +183,7 @@ fn models() -> Vec<(String, LinkModel)> {
         let memory = match jitter.correlation {
             Correlation::PerPacket(_) => "correlated by packet",
             Correlation::InTime(_) => "correlated in time",
+            Correlation::PartlyInTime { .. } => "partly correlated in time",
             _ => "independent",
         };
         add(&format!("jitter, {law}, {memory}"), LinkConfig { delay: delay.clone(), ..LinkConfig::default() });

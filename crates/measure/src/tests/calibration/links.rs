@@ -24,10 +24,11 @@ fn probability(value: f64) -> Probability {
 fn random_link(rng: &mut TestRng) -> LinkConfig {
     use Distribution::{Gamma, Laplace, LogNormal, Normal, Pareto, ParetoNormal, Uniform, Weibull};
     let distribution = rng.pick(&[Normal, Uniform, Laplace, LogNormal, Gamma, Weibull, Pareto, ParetoNormal]).clone();
-    let correlation = match rng.pick(&[0, 1, 2]) {
+    let correlation = match rng.pick(&[0, 1, 2, 3]) {
         0 => Correlation::None,
         1 => Correlation::PerPacket(0.95 * rng.unit()),
-        _ => Correlation::InTime(Duration::from_secs_f64(0.03 * rng.unit() + 1e-4)),
+        2 => Correlation::InTime(Duration::from_secs_f64(0.03 * rng.unit() + 1e-4)),
+        _ => Correlation::PartlyInTime { time: Duration::from_secs_f64(0.03 * rng.unit() + 1e-4), share: 0.1 + 0.8 * rng.unit() },
     };
     let jitter = Jitter { correlation, ..Jitter::new(Duration::from_secs_f64(0.001 + 0.007 * rng.unit()), distribution) };
     let share = 0.01 + 0.2 * rng.unit();

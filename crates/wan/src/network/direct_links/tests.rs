@@ -48,8 +48,16 @@ fn links_in_order_decide_what_whole_links_decide() {
     let full =
         ["delay 24ms 9ms loss 10%", "delay 24ms 4ms 50% loss gemodel 5% 20%"].map(|words| in_order(queued(words, Some(QueueLimit::Packets(3)))));
     // Correlated in time, over packets at distances of 8 and 4 ms and, where some are left out, of more.
-    let in_time = [Distribution::LogNormal, Distribution::Gamma, Distribution::Uniform].map(|law| {
-        let correlation = Correlation::InTime(Duration::from_millis(50));
+    let time = Duration::from_millis(50);
+    let (whole, partly) = (Correlation::InTime(time), Correlation::PartlyInTime { time, share: 0.6 });
+    let memories = [
+        (Distribution::LogNormal, whole),
+        (Distribution::Gamma, whole),
+        (Distribution::Uniform, whole),
+        (Distribution::LogNormal, partly),
+        (Distribution::Gamma, partly),
+    ];
+    let in_time = memories.map(|(law, correlation)| {
         let jitter = Jitter { correlation, ..Jitter::new(Duration::from_millis(9), law) };
         let delay = Delay::with_jitter(Duration::from_millis(24), jitter).unwrap();
         let LinkModel::Fixed(config) = model("loss 10%") else { panic!("words are a configuration") };

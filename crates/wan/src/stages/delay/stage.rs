@@ -58,7 +58,7 @@ impl Weights {
             Memory::None => 0.0,
             Memory::PerPacket(phi) => phi,
             // φ = e^(−Δ/τ) of an Ornstein–Uhlenbeck process.
-            Memory::InTime { tau_nanos } => libm::exp(-nanos(Duration::from_nanos(span)) / tau_nanos),
+            Memory::InTime { tau_nanos, .. } => libm::exp(-nanos(Duration::from_nanos(span)) / tau_nanos),
         };
         Self { span, phi, fresh: fresh_share(phi) }
     }
@@ -155,7 +155,7 @@ impl DelayStage {
                     weights.phi * before + weights.fresh * fresh
                 });
                 *chain = Some((z, now));
-                at_normal(&checked.law, z)
+                at_normal(&checked.law, mixed(checked.memory, z, || standard_normal(more.next_word(), || more.next_word())))
             }
         }
     }
@@ -166,6 +166,8 @@ impl DelayStage {
 pub(crate) struct CorrelatedDelays {
     marginal: Marginal,
     memory: Memory,
+    /// `true` if only a share of the variance has memory.
+    is_of_share: bool,
     weights: Weights,
 }
 
@@ -186,7 +188,8 @@ impl CorrelatedDelays {
         }
         // A gamma law gets a separate form, without the choice between laws at each packet.
         let marginal = checked.law.as_gamma().map_or_else(|| Marginal::Other(Arc::clone(checked)), Marginal::Gamma);
-        Some(Self { marginal, memory, weights: Weights::new(memory, 0) })
+        let is_of_share = matches!(memory, Memory::InTime { parts: [_, rest], .. } if rest > 0.0);
+        Some(Self { marginal, memory, is_of_share, weights: Weights::new(memory, 0) })
     }
 
     /// Returns whether the correlation depends on the time between packets.
@@ -212,12 +215,35 @@ impl CorrelatedDelays {
     /// Returns the delay of a packet \[ns\], with the present weights. `chain` is as for [`draw_nanos`](Self::draw_nanos).
     #[inline(always)]
     pub(crate) fn next_nanos(&self, chain: &mut f64, word: u64, packet: PacketDraws) -> u64 {
+        if self.is_of_share {
+            return self.next_of_share(chain, packet);
+        }
         let fresh = normal(Purpose::Jitter, word, packet);
+        self.move_on(chain, fresh);
+        self.nanos_at(*chain)
+    }
+
+    /// Returns the delay of a packet \[ns\] if only a share of the variance has memory. Not inlined, because few links have such a memory.
+    #[inline(never)]
+    fn next_of_share(&self, chain: &mut f64, packet: PacketDraws) -> u64 {
+        let mut words = packet.draws(Purpose::Jitter);
+        let mut normal = || standard_normal(words.next_word(), || words.next_word());
+        self.move_on(chain, normal());
+        self.nanos_at(mixed(self.memory, *chain, normal))
+    }
+
+    /// Replaces the value of a chain, or NaN before the first packet, by the next value.
+    #[inline(always)]
+    fn move_on(&self, chain: &mut f64, fresh: f64) {
         // The first value has the stationary law of the chain, so no start-up transient exists.
         *chain = if chain.is_nan() { fresh } else { self.weights.phi * *chain + self.weights.fresh * fresh };
+    }
+
+    #[inline(always)]
+    fn nanos_at(&self, z: f64) -> u64 {
         match &self.marginal {
-            Marginal::Gamma(law) => count(law.at_normal(*chain)),
-            Marginal::Other(checked) => at_normal(&checked.law, *chain),
+            Marginal::Gamma(law) => count(law.at_normal(z)),
+            Marginal::Other(checked) => at_normal(&checked.law, z),
         }
     }
 
@@ -239,6 +265,15 @@ impl CorrelatedDelays {
             *following = self.weights.phi * before + self.weights.fresh * in_the_core_or_nan(*word);
         }
         following
+    }
+}
+
+/// Returns the normal number of a delay: the value of its chain, mixed with a number of the packet alone where only a share of the variance has memory.
+#[inline(always)]
+fn mixed(memory: Memory, chain: f64, alone: impl FnOnce() -> f64) -> f64 {
+    match memory {
+        Memory::InTime { parts: [of_chain, rest], .. } if rest > 0.0 => of_chain * chain + rest * alone(),
+        Memory::None | Memory::PerPacket(_) | Memory::InTime { .. } => chain,
     }
 }
 
@@ -363,7 +398,7 @@ mod tests {
     fn correlated_delays_have_their_law_and_their_correlation() {
         for distribution in [Distribution::Normal, Distribution::Uniform, Distribution::Gamma, Distribution::LogNormal] {
             let tau = Duration::from_secs_f64(-0.008 / 0.9_f64.ln());
-            for correlation in [Correlation::PerPacket(0.9), Correlation::InTime(tau)] {
+            for correlation in [Correlation::PerPacket(0.9), Correlation::InTime(tau), Correlation::PartlyInTime { time: tau, share: 0.6 }] {
                 let jitter = Jitter { correlation, ..Jitter::new(2 * MILLISECOND, distribution.clone()) };
                 let delay = Delay::with_jitter(24 * MILLISECOND, jitter).unwrap();
                 let sample = draws(&delay, 100_000, 8 * MILLISECOND);
@@ -374,6 +409,7 @@ mod tests {
                 let expected = match correlation {
                     Correlation::PerPacket(rho) => rho,
                     Correlation::None | Correlation::InTime(_) => delay.law().unwrap().correlation(0.9),
+                    Correlation::PartlyInTime { share, .. } => delay.law().unwrap().correlation(share * 0.9),
                 };
                 assert!((covariance / variance - expected).abs() < 4.5 * 3.0 * 0.0014, "{distribution:?} {correlation:?} {}", covariance / variance);
                 // Every 50th delay is independent of the others except for a correlation of 0.9^50 = 0.5 %: n = 2000.

@@ -101,14 +101,20 @@ fn jitter(delay: &Delay, chain: &mut Option<(f64, u64)>, now: u64, number: u64) 
                 Some((before, then)) => {
                     let phi = match memory {
                         Correlation::PerPacket(_) => PHIS[JITTERS.iter().position(|other| other == delay).unwrap()],
-                        Correlation::InTime(tau) => (-((now - then) as f64) / tau.as_nanos() as f64).exp(),
+                        Correlation::InTime(time) | Correlation::PartlyInTime { time, .. } => (-((now - then) as f64) / time.as_nanos() as f64).exp(),
                         _ => 0.0,
                     };
                     phi * before + (1.0 - phi * phi).sqrt() * fresh
                 }
             };
             *chain = Some((z, now));
-            law.at_normal(z)
+            law.at_normal(match memory {
+                Correlation::PartlyInTime { share, .. } => {
+                    let word = draws.next_word();
+                    share.sqrt() * z + (1.0 - share).sqrt() * standard_normal(word, || draws.next_word())
+                }
+                _ => z,
+            })
         }
     };
     nanos.round_ties_even() as u64

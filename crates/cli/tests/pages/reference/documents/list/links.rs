@@ -64,6 +64,7 @@ pub(super) const LINKS: [Document; 3] = [
                 "goodness.NAME",
                 "what was measured, and how well each law and each model of loss fits: `resolution_s` of the clock, `effective` number of delays; of each law \
                  `kolmogorov`, its `p_value`, and whether it `fits`, with a distance of at most `kolmogorov_limit`; \
+                 the `correlation` of the delays: its `time_s`, the `share` of the variation that has this memory, and the correlation `lag_one` of neighbours, each with its error; \
                  `independence` of the delays, or of what the correlation time does not explain: rank correlation of `neighbours`, and the `statistic` of several `lags` \
                  with its `p_value`",
             ),
