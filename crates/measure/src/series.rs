@@ -31,8 +31,8 @@ pub(crate) fn variance(values: &[f64]) -> Option<f64> {
 }
 
 /// Returns the autocorrelation at lags 1 to `lags` of a series with missing values: the mean product of deviations over pairs with both values, divided by
-/// the variance over all values (Parzen 1963, Sankhyā A 25(4)), or by the variance within the pairs where that is larger, so that no result is beyond ±1. Empty
-/// for a constant series; shorter than `lags` if no pair is that far apart.
+/// the variance over all values (Parzen 1963, Sankhyā A 25(4)), or by the variance within the pairs where the quotient would be beyond ±1. Empty for a constant
+/// series; shorter than `lags` if no pair is that far apart.
 pub(crate) fn autocorrelation(series: &[Option<f64>], lags: usize) -> Vec<f64> {
     let present: Vec<f64> = series.iter().filter_map(|value| *value).collect();
     let Some(mean) = mean(&present) else { return Vec::new() };
@@ -48,7 +48,7 @@ pub(crate) fn autocorrelation(series: &[Option<f64>], lags: usize) -> Vec<f64> {
 /// square of all deviations.
 ///
 /// Pairs may vary more than all values: the values at both ends have one neighbour only, and a value beside a gap may have none. The mean product can then exceed
-/// `power`, but never the geometric mean of the mean squares of the earlier and of the later values of the pairs (Cauchy and Schwarz).
+/// `power`, but never the geometric mean of the mean squares of the earlier and of the later values of the pairs (Cauchy and Schwarz), which is the divisor then.
 pub(crate) fn correlation_of_pairs(deviations: &[Option<f64>], power: f64, lag: usize) -> Option<(f64, f64)> {
     let pairs = deviations.iter().zip(deviations.iter().skip(lag)).filter_map(|(one, other)| Some(((*one)?, (*other)?)));
     let (mut product, mut earlier, mut later, mut number) = (0.0, 0.0, 0.0, 0_usize);
@@ -59,7 +59,8 @@ pub(crate) fn correlation_of_pairs(deviations: &[Option<f64>], power: f64, lag: 
         number += 1;
     }
     let pairs = count(number);
-    let whole = (pairs * power).max((earlier * later).sqrt());
+    let whole = pairs * power;
+    let whole = if product.abs() > whole { (earlier * later).sqrt() } else { whole };
     // The sums are rounded, so that a result could still be beyond 1 by its last digit.
     (number > 0).then(|| ((product / whole).clamp(-1.0, 1.0), pairs))
 }
@@ -139,8 +140,8 @@ mod tests {
         // The only pair has the two values that are farthest from the mean.
         assert_eq!(autocorrelation(&[Some(2.0), Some(2.0), None, Some(0.0), None, Some(0.0), None, Some(0.0)], 1), [1.0]);
         assert_eq!(autocorrelation(&[Some(2.0), Some(-2.0), None, Some(0.0), None, Some(0.0)], 1), [-1.0]);
-        // The three pairs vary less than all values, whose variance is 5: the mean product of 3, −1 and 3 is divided by 5.
-        assert_eq!(autocorrelation(&[Some(3.0), Some(1.0), Some(-1.0), Some(-3.0)], 1), [5.0 / 15.0]);
+        // All other results are divided by the variance of all values, also where the pairs vary more: by √30/4 = 1.37 here, where the variance is 1.2.
+        assert_eq!(autocorrelation(&[Some(0.0), Some(2.0), Some(0.0), Some(-1.0), Some(-1.0)], 1), [0.25 / 1.2]);
     }
 
     #[test]
