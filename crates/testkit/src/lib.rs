@@ -90,6 +90,7 @@
 //! | [`COHAPTIC_TEST_STALL`](STALL_VARIABLE) | for how long anything may run without returning to the test bed, by the wall clock |
 //! | [`COHAPTIC_TEST_ARTEFACTS`](ARTEFACTS_VARIABLE) | the folder below which every test that fails writes what happened |
 //! | `COHAPTIC_TEST_LOOPBACK` | words of `tc-netem` for the loopback of tests that make no test bed, under `cohaptic test`: `docs/how-to-existing-program.md` |
+//! | `COHAPTIC_TEST_LIMIT` | the time limit of these tests, in virtual time, such as `30h`; an hour otherwise |
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "tests"))]
 
 mod access;

@@ -106,6 +106,28 @@ async fn fails() {
 }
 
 #[test]
+fn a_suite_may_take_longer_than_an_hour_of_virtual_time() {
+    let output = |limit| run("loopback::for_two_hours", &[("COHAPTIC_TEST_LOOPBACK", "delay 20ms"), ("COHAPTIC_TEST_LIMIT", limit)]);
+    for (limit, expected) in
+        [("3h", None), ("off", None), ("1h", Some("beyond its time limit of 3600s")), ("3", Some("COHAPTIC_TEST_LIMIT: no unit in"))]
+    {
+        let output = output(limit);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() == expected.is_none() && text.contains(expected.unwrap_or_default()), "{limit}: {text}");
+    }
+}
+
+/// Takes two hours of virtual time.
+#[test]
+fn for_two_hours() {
+    if std::env::var_os("COHAPTIC_TEST_LIMIT").is_some() {
+        tokio::runtime::Runtime::new().unwrap().block_on(async {
+            tokio::time::sleep(std::time::Duration::from_secs(7200)).await;
+        });
+    }
+}
+
+#[test]
 fn a_socket_before_block_on_is_refused() {
     let output = run("loopback::before_block_on", &[("COHAPTIC_TEST_LOOPBACK", "delay 20ms")]);
     let text = String::from_utf8_lossy(&output.stderr);

@@ -7,7 +7,7 @@ use super::Testbed;
 use crate::core::Core;
 use crate::link::ToLink;
 use crate::seed::{Place, Seed};
-use crate::watch::Watched;
+use crate::watch::{Watched, span};
 use crate::wire::Recorded;
 
 /// Name of the host.
@@ -16,11 +16,19 @@ const HOST: &str = "host";
 /// Name of the receiver of the link, in the trace and in names of files.
 const LOOPBACK: &str = "loopback";
 
+/// Name of the environment variable with the time limit of tests that make no test bed, and thus cannot call [`Testbed::time_limit`].
+const LIMIT_VARIABLE: &str = "COHAPTIC_TEST_LIMIT";
+
 impl Testbed {
     /// Creates a test bed of one host. The packets of the host to itself take the link.
+    ///
+    /// # Panics
+    ///
+    /// If a variable of the environment has a wrong value.
     pub(crate) fn of_loopback(link: impl ToLink) -> Self {
         let mut bed = Self::new([HOST, LOOPBACK]).link(HOST, LOOPBACK, link).on_tokio().with_standard_of_environment();
         bed.setup.settings.loopback = Some(bed.setup.names.path(HOST, LOOPBACK));
+        bed.setup.settings.limits.time = span(LIMIT_VARIABLE, bed.setup.settings.limits.time);
         bed
     }
 

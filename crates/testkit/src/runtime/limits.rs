@@ -42,8 +42,8 @@ pub(super) fn nothing_will_happen(shared: &Shared, tasks: &Tasks, since: Instant
     // A future of another program beside the tasks is not listed, and its waker belongs to another thread.
     if text.is_empty() {
         text.push_str(
-            "\n  nobody waits for a socket of the test bed. Another thread, such as one that holds a lock, does not count: run tests that share a lock one after \
-             the other (`RUST_TEST_THREADS=1`)",
+            "\n  nobody waits for a socket of the test bed. Another thread, such as one that holds a lock, does not count: run tests that share a lock one \
+             after the other (`RUST_TEST_THREADS=1`)",
         );
     }
     panic!(
@@ -60,19 +60,21 @@ pub(super) fn nothing_will_happen(shared: &Shared, tasks: &Tasks, since: Instant
 /// Always.
 #[expect(clippy::panic, reason = "the program goes on for ever; says who does, over which network, and the way out")]
 pub(super) fn goes_on(shared: &Shared, tasks: &Tasks, limit: Reached) -> ! {
-    let (now, text) = shared.with(|core| {
+    let (now, is_loopback, text) = shared.with(|core| {
         let mut text = String::new();
         write_lines(&mut text, " links", core.settings.said.lines(core.plan.names()).into_iter());
         let network = if text.is_empty() { "\n  ideal links".to_owned() } else { text };
-        (core.now(), format!("The network:{network}\nWho waits:{}", who_waits(core, tasks)))
+        (core.now(), core.settings.loopback.is_some(), format!("The network:{network}\nWho waits:{}", who_waits(core, tasks)))
     });
-    let (limit, method) = match limit {
-        Reached::Time(time) => (format!("its time limit of {}", Span(time)), "time_limit"),
-        Reached::Steps(steps) => (format!("its step limit of {steps} polls of tasks"), "step_limit"),
+    let (limit, way) = match limit {
+        // Tests on a loopback know of no test bed.
+        Reached::Time(time) if is_loopback => (format!("its time limit of {}", Span(time)), "the variable COHAPTIC_TEST_LIMIT"),
+        Reached::Time(time) => (format!("its time limit of {}", Span(time)), "`Testbed::time_limit`"),
+        Reached::Steps(steps) => (format!("its step limit of {steps} polls of tasks"), "`Testbed::step_limit`"),
     };
     panic!(
         "the run goes on beyond {limit}, at {} s. A program that tries again needs a last attempt, or a `timeout` around all attempts; \
-         `Testbed::{method}` sets another limit. {text}",
+         {way} sets another limit. {text}",
         Seconds(now)
     );
 }

@@ -14,18 +14,27 @@ pub const STALL_VARIABLE: &str = "COHAPTIC_TEST_STALL";
 ///
 /// If the value of the environment variable is no span.
 pub(crate) fn limit(said: Duration) -> Duration {
-    of(std::env::var(STALL_VARIABLE).ok().as_deref(), said)
+    span(STALL_VARIABLE, said)
 }
 
-#[expect(clippy::panic, reason = "a test that is not watched as was asked for is worse than none")]
-fn of(environment: Option<&str>, said: Duration) -> Duration {
+/// Returns the span of an environment variable, otherwise `said`. The value `off` stands for [`Duration::MAX`].
+///
+/// # Panics
+///
+/// If the value of the environment variable is no span.
+pub(crate) fn span(variable: &str, said: Duration) -> Duration {
+    of(variable, std::env::var(variable).ok().as_deref(), said)
+}
+
+#[expect(clippy::panic, reason = "a test with another limit than was asked for is worse than none")]
+fn of(variable: &str, environment: Option<&str>, said: Duration) -> Duration {
     match environment {
         None => said,
         Some("off") => Duration::MAX,
         Some(text) => match parse::duration(text) {
             Ok(span) if !span.is_zero() => span,
-            Ok(_) => panic!("{STALL_VARIABLE} is `{text}`; expected a span such as `10min`, or `off`"),
-            Err(error) => panic!("{STALL_VARIABLE}: {error}, or `off`"),
+            Ok(_) => panic!("{variable} is `{text}`; expected a span such as `10min`, or `off`"),
+            Err(error) => panic!("{variable}: {error}, or `off`"),
         },
     }
 }
@@ -46,21 +55,21 @@ mod tests {
     #[test]
     fn the_environment_comes_before_the_test() {
         let second = Duration::from_secs(1);
-        assert_eq!(of(None, second), second);
-        assert_eq!(of(Some("10min"), second), Duration::from_secs(600));
-        assert_eq!(of(Some("off"), second), Duration::MAX);
+        assert_eq!(of(STALL_VARIABLE, None, second), second);
+        assert_eq!(of(STALL_VARIABLE, Some("10min"), second), Duration::from_secs(600));
+        assert_eq!(of(STALL_VARIABLE, Some("off"), second), Duration::MAX);
     }
 
     #[test]
     #[should_panic(expected = "COHAPTIC_TEST_STALL is `0s`; expected a span such as `10min`, or `off`")]
     fn no_span_at_all_is_refused() {
-        of(Some("0s"), Duration::MAX);
+        of(STALL_VARIABLE, Some("0s"), Duration::MAX);
     }
 
     #[test]
     #[should_panic(expected = "COHAPTIC_TEST_STALL: no unit in \"60\": expected a duration")]
     fn a_span_without_a_unit_is_refused() {
-        of(Some("60"), Duration::MAX);
+        of(STALL_VARIABLE, Some("60"), Duration::MAX);
     }
 
     #[test]

@@ -21,6 +21,8 @@ use crate::seed::Seed;
 
 pub use guard::STALL_VARIABLE;
 pub(crate) use guard::limit;
+#[cfg(feature = "loopback")]
+pub(crate) use guard::span;
 
 /// Default time without a return after which the process ends.
 pub(crate) const LIMIT: Duration = Duration::from_secs(60);

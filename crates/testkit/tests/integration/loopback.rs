@@ -163,6 +163,18 @@ fn a_program_that_waits_for_ever_is_ended() {
 }
 
 #[test]
+fn the_limit_of_time_names_its_variable() {
+    let program = async || {
+        tokio::time::sleep(Duration::from_secs(7200)).await;
+    };
+    let text = message(move || run("delay 1ms", program()));
+    assert!(
+        text.contains("beyond its time limit of 3600s, at 7200 s") && text.contains("the variable COHAPTIC_TEST_LIMIT sets another limit"),
+        "{text}"
+    );
+}
+
+#[test]
 fn other_words_are_refused_with_their_place() {
     let refused = |words: &'static str| message(move || Loopback::new(words));
     let text = refused("delay 20ms loss 1");
