@@ -19,7 +19,7 @@ def tables(suite, figures):
     return {
         PASSING: [row(f"{name} {suite.version} ({suite.licence})", tests, figures["networked"], *passing, figures["changed"])],
         TIMES: [row(name, *(f"{taken:.2f}" for taken in figures["seconds"]))],
-        UNDER_LOAD: [row(name, figures["loads"], figures["real under load"], figures["bed under load"])],
+        UNDER_LOAD: [row(name, figures["loads"], figures["real under load"], figures["bed under load"])] if figures["loads"] else [],
         FAILURES: [
             row(name, f"`{test}`", f"`{words}`", f"{len(seeds)} of {figures['seeds']}", f"`{smallest}`, seed {seeds[0]}")
             for test, words, seeds, smallest in figures["failures"]

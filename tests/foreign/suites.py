@@ -37,7 +37,7 @@ SUITES = [
     # A lock keeps the tests apart. A test bed cannot wait for another thread, so that its tests run one after the other on one thread.
     Suite("bore-cli", "0.6.0", "MIT", variables={"RUST_TEST_THREADS": "1"}, loads=20),
     # The program left out measures a hundred nodes in memory, for minutes and without a socket.
-    Suite("chitchat", "0.10.1", "MIT", variables={"COHAPTIC_TEST_LIMIT": "30h"}, skipped=("test perf_test",), reals=1, seeds=3, loads=2),
+    Suite("chitchat", "0.10.1", "MIT", variables={"COHAPTIC_TEST_LIMIT": "30h"}, skipped=("test perf_test",), reals=1, seeds=3, loads=0),
     # The macro of the tests is a private feature, which the archive of axum takes from a path.
     Suite(
         "axum",
