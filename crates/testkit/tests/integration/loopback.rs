@@ -168,10 +168,7 @@ fn the_limit_of_time_names_its_variable() {
         tokio::time::sleep(Duration::from_secs(7200)).await;
     };
     let text = message(move || run("delay 1ms", program()));
-    assert!(
-        text.contains("beyond its time limit of 3600s, at ") && text.contains("the variable COHAPTIC_TEST_LIMIT sets another limit"),
-        "{text}"
-    );
+    assert!(text.contains("beyond its time limit of 3600s, at ") && text.contains("the variable COHAPTIC_TEST_LIMIT sets another limit"), "{text}");
 }
 
 #[test]
