@@ -115,7 +115,7 @@ impl<'a> Watch<'a> {
         }
         let Some(got) = signals::read(self.signals)? else { return Ok(()) };
         if !matches!(got.signal, Signal::SIGUSR1 | Signal::SIGUSR2) {
-            self.signal = self.signal.or(Some(signals::number(got.signal)));
+            self.signal.get_or_insert_with(|| signals::number(got.signal));
         }
         if !got.is_of_terminal {
             // Process 1 then has the signal too, if it was sent to the whole group.
