@@ -38,7 +38,7 @@ fn three_connections(is_lost: impl Fn(u64) -> bool) -> Tried {
 /// Packets that a link loses by chance with a seed: here one in four.
 fn by_chance(seed: u64, number: u64) -> bool {
     let mixed = (seed + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (number + 1).wrapping_mul(0xd1b5_4a32_d192_ed03);
-    (mixed.wrapping_mul(0xff51_afd7_ed55_8ccd) >> 40) % 4 == 0
+    (mixed.wrapping_mul(0xff51_afd7_ed55_8ccd) >> 40).is_multiple_of(4)
 }
 
 fn connections(trial: Trial<'_>) -> Result<Tried, ()> {
