@@ -34,7 +34,10 @@ pub fn words(measured: &Measured) -> String {
         line("  * more than 4 standard errors from what was asked".to_owned());
     }
     if measured.achieved.delay.as_ref().is_some_and(|delay| delay.mean_se_s.is_none()) && measured.sent >= LEAST_JUDGED {
-        line("  no standard error: the delays change more slowly than a stream of this length can tell; longer: --every 8ms, or more --packets".to_owned());
+        line(
+            "  no standard error: the delays change more slowly than a stream of this length can tell; longer: --every 8ms, or more --packets"
+                .to_owned(),
+        );
     }
     if !fills_the_rate(measured) {
         line("  the stream does not fill the rate: larger packets (--size) or less time between packets (--every) do".to_owned());
