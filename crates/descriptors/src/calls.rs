@@ -1,6 +1,6 @@
 //! Calls of the system on descriptors of placeholders.
 //!
-//! Each function returns `None` for a descriptor without a socket of a test bed: the call is then for the system. Errors have the numbers of Linux where
+//! Functions return `None` for a descriptor without a socket of a test bed: the call is then for the system. Errors have the numbers of Linux where
 //! Linux has the error. A call that would wait fails with [`io::ErrorKind::WouldBlock`] on a non-blocking descriptor. On a blocking descriptor virtual time
 //! could not pass during the wait. Then the run fails with host and call in its text, and the call itself fails with `EDEADLK`, so that the program goes on to
 //! a place where the run can end.

@@ -109,7 +109,7 @@ fn the_first_cause_counts() {
     let asked = Moment { setpoint_at: Some(late), ..read };
     let mut found = Vec::new();
     for moment in [broken, ready, armed, read, asked] {
-        // Each moment has a gate of its own, so that every gate has paused equally long.
+        // A moment has a gate of its own, so that every gate has paused equally long.
         let mut paused = Gate::new(*gate.limits(), Stopper::default()).unwrap();
         paused.admit([0.0; 3], &well(at(0)));
         found.push(cause(paused.admit([f64::NAN; 3], &moment)));

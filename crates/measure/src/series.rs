@@ -140,7 +140,7 @@ mod tests {
         // The only pair has the two values that are farthest from the mean.
         assert_eq!(autocorrelation(&[Some(2.0), Some(2.0), None, Some(0.0), None, Some(0.0), None, Some(0.0)], 1), [1.0]);
         assert_eq!(autocorrelation(&[Some(2.0), Some(-2.0), None, Some(0.0), None, Some(0.0)], 1), [-1.0]);
-        // All other results are divided by the variance of all values, also where the pairs vary more: by √30/4 = 1.37 here, where the variance is 1.2.
+        // Results elsewhere are divided by the variance of all values, also where the pairs vary more: by √30/4 = 1.37 here, where the variance is 1.2.
         assert_eq!(autocorrelation(&[Some(0.0), Some(2.0), Some(0.0), Some(-1.0), Some(-1.0)], 1), [0.25 / 1.2]);
     }
 

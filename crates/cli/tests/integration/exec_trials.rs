@@ -8,7 +8,8 @@ use std::time::Duration;
 use serde_json::json;
 
 use crate::integration::desk::{Desk, parse};
-use crate::integration::exec::{can_run, net, with_role};
+use crate::integration::exec::{can_run, with_role};
+use crate::integration::exec_hosts::net;
 use crate::integration::running::{PATIENCE, Running};
 
 /// A server of the real machine that sends back what each datagram brings.

@@ -23,6 +23,8 @@ mod errors;
 #[cfg(unix)]
 mod exec;
 #[cfg(unix)]
+mod exec_hosts;
+#[cfg(unix)]
 mod exec_trials;
 mod existing;
 mod explain;

@@ -99,7 +99,7 @@ impl TcpTable {
         let Some(flow) = self.flows.get_mut(&ends) else { return };
         let Stage::Opening { syn, socket } = &flow.stage else { return };
         let failed = match socket.take_error() {
-            // Neither an error nor a peer: the socket still connects, and a later event comes here again.
+            // A socket without an error and without a peer still connects, and a later event comes here again.
             Ok(None) if socket.peer_addr().is_err() => return,
             Ok(error) => error,
             Err(error) => Some(error),

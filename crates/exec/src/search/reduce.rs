@@ -29,7 +29,7 @@ pub(super) fn reduce<E>(start: LostPackets, mut fails: impl FnMut(&LostPackets) 
                 break;
             }
         }
-        // Each accepted set has fewer packets, or as many with a lower sum of numbers, so the loop ends.
+        // An accepted set has fewer packets, or as many with a lower sum of numbers, so the loop ends.
         let Some(smaller) = smaller else { return Ok(best) };
         best = smaller;
     }

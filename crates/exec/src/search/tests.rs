@@ -136,7 +136,7 @@ fn causes_other_than_lost_packets_are_told_apart() {
     assert_eq!(slow, Ok(Found::Case(Case { seed: 1, lost: LostPackets::default() }, Count { failed: 3, runs: 3 })));
 }
 
-/// What never fails again is reported with its count, and what fails more often is preferred.
+/// A case that never fails again is reported with its count, and a case that fails more often is preferred.
 #[test]
 fn a_failure_that_does_not_come_back_is_reported_as_such() {
     // Seed 5 fails once, and its packets never again. The packets of seed 7 fail every other time.

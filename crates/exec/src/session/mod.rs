@@ -136,7 +136,7 @@ pub fn run(plan: &Plan, hear: &(dyn Fn(Line<'_>) + Sync)) -> Result<Outcome, Fai
     let signals = signals::passed_on();
     let signals =
         signals.thread_block().and_then(|()| SignalFd::new(&signals)).map_err(|error| Failed::own(format!("cannot watch signals: {error}")))?;
-    // All processes are started before the first device is awaited, so that the namespaces are made in parallel.
+    // Processes of all hosts are started before the first device is awaited, so that the namespaces are made in parallel.
     let mut hosts = Vec::new();
     for host in &plan.hosts {
         hosts.push(Host::begin(&host.setup, &host.command, host.output).map_err(|failed| named(plan, host, failed))?);

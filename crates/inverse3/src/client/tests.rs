@@ -175,7 +175,7 @@ fn a_late_reply_is_not_taken_for_the_reply_to_the_zero() {
         client.receive(at(ms), &reply(&["04C3"], ""));
         assert!(sent(&mut client, at(ms)).is_empty() && client.snapshot(at(ms)).for_peer().is_none(), "{ms}");
     }
-    // Neither has ended the doubt: the reply to the zero is waited for.
+    // The doubt goes on: the reply to the zero is still awaited.
     assert_eq!(client.poll_timeout(), Some(due + LOST));
     client.receive(at(219), &reply(&["04C3"], CENTRED));
     assert_eq!(client.snapshot(at(219)).reading.unwrap().1, due);

@@ -9,7 +9,7 @@
 //! ln L(τ) = Σ −½·ln(1 − φ²) − (z' − φz)²/(2(1 − φ²)) + z'²/2      (0 for independent delays)
 //! ```
 //!
-//! Where the delays say so clearly, only a share of the variation has the memory: see [`partial_memory`].
+//! Only a share of the variation has the memory where the delays say so clearly: see [`partial_memory`].
 
 use serde::Serialize;
 

@@ -163,7 +163,7 @@ mod tests {
             assert!((fit.time_s / time).ln().abs() < 4.0 * time_se / fit.time_s && time_se < 0.5 * time, "{fit:?}");
             assert!((fit.share - share).abs() < 4.0 * share_se && share_se < 0.1, "{fit:?}");
             assert!((fit.lag_one - share * (-0.008 / time).exp()).abs() < 4.0 * lag_se, "{fit:?}");
-            // Both numbers are all of the memory, so that the innovations are independent.
+            // The memory consists of the two numbers, so that the innovations are independent.
             assert!(independence::test(&innovations.into_iter().map(Some).collect::<Vec<_>>()).unwrap().holds(), "{fit:?}");
         }
     }

@@ -5,6 +5,7 @@
 mod every_key;
 mod files;
 mod link_keys;
+mod link_refusals;
 mod manual;
 mod many_peers;
 mod mutations;

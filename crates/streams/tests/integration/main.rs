@@ -52,7 +52,7 @@ enum Seen {
 /// Driver in virtual time, whose ends take all bytes at once.
 struct Driver {
     engine: Engine,
-    /// Each event seen, with the connection and the end. A close and a reset are noted at the client's end.
+    /// Observed event, with the connection and the end. A close and a reset are noted at the client's end.
     seen: Vec<(ConnectionId, Side, Seen)>,
 }
 

@@ -260,7 +260,7 @@ mod tests {
     use crate::stages::loss::Pattern;
     use crate::stages::modulation::{Modulator, ModulatorState};
 
-    /// Each state of a modulator loses the chosen packets alone, and keeps its delay.
+    /// States of a modulator lose the chosen packets alone, and keep the delays.
     #[test]
     fn another_loss_leaves_all_else_as_it_was() {
         let chosen = Loss::Pattern(Pattern::of_packets(vec![2..3], None).unwrap());

@@ -19,7 +19,7 @@ const DRAWN_AT_ONCE: u16 = 8;
 /// Links from one node to all nodes, in the order of receivers.
 type Row<P> = [Line<P, InNetwork<P>>];
 
-/// What all packets of a broadcast have in common.
+/// Values that all packets of a broadcast share.
 struct Sent<'a, P> {
     now: Instant,
     from: NodeId,
@@ -145,7 +145,7 @@ fn schedule_each<P: Clone>(row: &mut Row<P>, first: LinkId, traffic: &mut Traffi
     // Arrival of the packet before in this row. Its link has a lower number, so that a packet with an equal arrival follows it.
     let mut before = None;
     for lines in row[usize::from(begin)..].chunks_mut(usize::from(DRAWN_AT_ONCE)) {
-        // All draws for some receivers come before any other work. The draws do not depend on each other, so a processor can compute several at once.
+        // Draws for some receivers come before any other work. The draws do not depend on each other, so a processor can compute several at once.
         let mut words = [[0; 2]; DRAWN_AT_ONCE as usize];
         // The link from the node to itself has words as well, so words and links stay in step.
         for (words, line) in words.iter_mut().zip(&*lines) {

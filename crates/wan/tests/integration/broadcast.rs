@@ -63,7 +63,7 @@ fn even_config() -> impl Strategy<Value = LinkConfig> {
     micros.prop_map(|micros| LinkConfig { delay: Delay::constant(Duration::from_micros(micros)), ..LinkConfig::default() })
 }
 
-/// What a driver does.
+/// Action of a driver.
 #[derive(Clone, Debug)]
 enum Act {
     /// Sends a packet to all others.
