@@ -84,12 +84,11 @@ fn main() -> ExitCode {
     let arguments = match Arguments::of(std::env::args_os()) {
         Ok(arguments) => arguments,
         Err(error) => {
-            let is_fault = error.use_stderr();
-            let status = report::wrong_usage(&report::visible(error));
             // `exec` has the status of its command, so that each failure of its own has one and the same status.
             let is_of_exec =
                 std::env::args_os().skip(1).find(|argument| !argument.as_encoded_bytes().starts_with(b"-")).is_some_and(|name| name == "exec");
-            return if is_fault && is_of_exec { ExitCode::from(failure::EXEC_FAILED) } else { status };
+            let fault_status = if is_of_exec { failure::EXEC_FAILED } else { failure::BAD_INPUT };
+            return report::wrong_usage(&report::visible(error), fault_status);
         }
     };
     if arguments.quiet {

@@ -12,7 +12,7 @@ use cohaptic_units::{Visible, visible_lines};
 use serde::Serialize;
 
 use crate::document_schema::{DocumentSchema, document};
-use crate::failure::{BAD_INPUT, CLOSED, Failure, INTERRUPTED};
+use crate::failure::{CLOSED, Failure, INTERRUPTED};
 use crate::output;
 
 /// Prints a failure on standard error, and under `--json` also as a document on standard output. Returns the exit status.
@@ -49,9 +49,9 @@ pub(crate) fn command_failed(program: &str, why: &str, status: u8) -> ExitCode {
     ExitCode::from(status)
 }
 
-/// Reports invalid arguments as clap does, and under `--json` also as a document. Returns the exit status. Help and version are no errors, unless they cannot
-/// be printed.
-pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
+/// Reports invalid arguments as clap does, and under `--json` also as a document. Returns the exit status, which for a fault is `fault_status`, also in the
+/// document. Help and version are no faults, unless they cannot be printed.
+pub(crate) fn wrong_usage(error: &clap::Error, fault_status: u8) -> ExitCode {
     // Help and version are printed here if standard output is no terminal, so that a failed write is reported. On a terminal clap prints them with colours.
     if !error.use_stderr() && !io::stdout().is_terminal() {
         return output::raw(error.render().to_string().as_bytes()).map_or_else(|failure| report(&failure), |()| ExitCode::SUCCESS);
@@ -61,11 +61,13 @@ pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
     if is_former_command(error) {
         let _ = writeln!(io::stderr(), "{FORMER_COMMAND}");
     }
-    let status = u8::try_from(error.exit_code()).unwrap_or(BAD_INPUT);
-    if error.use_stderr() && output::wants_json_error() {
-        let _ = print_usage(&error.render().to_string(), status);
+    if !error.use_stderr() {
+        return ExitCode::SUCCESS;
     }
-    ExitCode::from(status)
+    if output::wants_json_error() {
+        let _ = print_usage(&error.render().to_string(), fault_status);
+    }
+    ExitCode::from(fault_status)
 }
 
 /// Hint for users of the former command `accuracy`, now a separate program.

@@ -59,6 +59,7 @@ fn errors_of_arguments_files_and_options_are_documents() {
         ("link delay=1 --json", 2, json!("delay=1")),
         ("stability map two.toml --json", 2, json!(null)),
         ("admittance two.toml --peer nobody --json", 2, json!(null)),
+        ("exec 'delay 1ms' --json --runs 0 -- true", 125, json!(null)),
     ] {
         let outcome = desk.cohaptic(line);
         outcome.assert_refused(status, &["error: "]);
