@@ -36,7 +36,7 @@ pub(crate) struct JoinArguments {
     /// Also join a session at another computer without a key
     #[arg(long)]
     pub(crate) allow_remote: bool,
-    /// End by itself this time after the welcome of the session [default: on Ctrl-C]
+    /// End by itself this time after the welcome of the session, or after the start without a welcome [default: on Ctrl-C]
     #[arg(long = "for", value_name = "TIME", value_parser = parse::duration)]
     pub(crate) length: Option<Duration>,
     #[command(flatten)]

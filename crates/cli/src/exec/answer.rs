@@ -122,16 +122,39 @@ fn times(Count { failed, runs }: Count) -> String {
     if failed == 0 { "passes".to_owned() } else { format!("fails {failed} of {runs} times") }
 }
 
+/// Returns the results of a search that a signal has ended, as the end of a message: the failed seeds, and the smallest case that has failed in each trial.
+/// Empty if no seed has failed and no case is known.
+pub(super) fn so_far(arguments: &ExecArguments, plan: &Plan, seeds: &[(u64, Tried)], smallest: Option<&(Case, Count)>) -> String {
+    let mut text = failed_seeds(seeds).map_or_else(String::new, |failed| format!("\n{failed}"));
+    if let Some((case, count)) = smallest {
+        text.push('\n');
+        text.push_str(&fault(arguments, plan, case, *count));
+    }
+    text
+}
+
+/// Returns the line about the failed seeds, or `None` if none has failed.
+fn failed_seeds(seeds: &[(u64, Tried)]) -> Option<String> {
+    let failed: Vec<String> = seeds.iter().filter(|(_, tried)| tried.status != 0).map(|(seed, _)| seed.to_string()).collect();
+    (!failed.is_empty()).then(|| format!("{} of {} fail: {}", failed.len(), Counted(seeds.len() as u64, "seed"), failed.join(", ")))
+}
+
+/// Returns two lines about a case: how often the command fails, and the command line that repeats the case.
+fn fault(arguments: &ExecArguments, plan: &Plan, case: &Case, count: Count) -> String {
+    let packets = case.lost.len() as u64;
+    let cause = if packets == 0 { "without a lost packet".to_owned() } else { format!("if {} lost", were(packets)) };
+    format!("the command {} {cause}:\n  {}", times(count), again(arguments, plan, case))
+}
+
 /// Describes the result of a search, or of equal runs.
 pub(super) fn trials(arguments: &ExecArguments, plan: &Plan, trials: &Trials) -> String {
     let mut text = String::new();
-    let failed: Vec<String> = trials.seeds.iter().filter(|(_, tried)| tried.status != 0).map(|(seed, _)| seed.to_string()).collect();
     let mut line = |line: &str| {
         text.push_str(line);
         text.push('\n');
     };
-    if !failed.is_empty() {
-        line(&format!("{} of {} fail: {}", failed.len(), Counted(trials.seeds.len() as u64, "seed"), failed.join(", ")));
+    if let Some(failed) = failed_seeds(&trials.seeds) {
+        line(&failed);
     }
     match &trials.verdict {
         Verdict::Passed => line(&format!(
@@ -147,12 +170,7 @@ pub(super) fn trials(arguments: &ExecArguments, plan: &Plan, trials: &Trials) ->
             case.seed,
             Counted(u64::from(*runs), "run")
         )),
-        Verdict::Lost(case, count) => {
-            let packets = case.lost.len() as u64;
-            let cause = if packets == 0 { "without a lost packet".to_owned() } else { format!("if {} lost", were(packets)) };
-            line(&format!("the command {} {cause}:", times(*count)));
-            line(&format!("  {}", again(arguments, plan, case)));
-        }
+        Verdict::Lost(case, count) => line(&fault(arguments, plan, case, *count)),
     }
     if trials.packets == 0 {
         line("no packet has passed a link. Packets to localhost stay within a command; a server beside the command has the name host");

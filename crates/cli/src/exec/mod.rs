@@ -24,8 +24,8 @@ pub(crate) fn exec(arguments: &ExecArguments) -> ExitCode {
         Ok(status) => ExitCode::from(status),
         Err(Stop::Failure(failure)) => report::report_with(&failure, EXEC_FAILED),
         Err(Stop::Failed(Failed { status, why })) => report::command_failed("cohaptic exec", &why, status),
-        Err(Stop::Signal(number)) => {
-            let why = "a signal has ended the trials".to_owned();
+        Err(Stop::Signal(number, so_far)) => {
+            let why = format!("a signal has ended the trials{so_far}");
             report::report_with(&Failure::Interrupted(why), 128 + number)
         }
     }

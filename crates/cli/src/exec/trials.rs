@@ -48,8 +48,8 @@ pub(super) enum Verdict {
 
 /// Reason for an early end.
 pub(super) enum Stop {
-    /// Number of a signal that asks this program to end.
-    Signal(u8),
+    /// Number of a signal that asks this program to end, and the results until then in words, empty without results.
+    Signal(u8, String),
     /// A run has failed before its command.
     Failed(Failed),
     /// A file or standard output cannot be written.
@@ -66,16 +66,25 @@ impl From<Failure> for Stop {
 pub(super) fn run(arguments: &ExecArguments, plan: &Plan) -> Result<u8, Stop> {
     let bench = RefCell::new(Bench::new(arguments, plan));
     let mut seeds = Vec::new();
+    // Latest case that has failed in each trial. The search goes on from such a case to smaller ones alone, so that the latest one is the smallest.
+    let mut smallest = None;
     let verdict = match &arguments.seeds {
         Some(range) => {
             let search = Search { seeds: range.clone(), runs: arguments.runs.unwrap_or(RUNS), until_failure: arguments.until_failure };
             let hear = |step: Step<'_>| {
-                if let Step::Seed(seed, tried) = step {
-                    seeds.push((seed, tried.clone()));
+                match step {
+                    Step::Seed(seed, tried) => seeds.push((seed, tried.clone())),
+                    Step::Case(case, count) if count.is_each() => smallest = Some((case.clone(), count)),
+                    Step::Case(..) | Step::Ideal(_) => {}
                 }
                 bench.borrow_mut().say(&answer::step(step, &plan.nodes()));
             };
-            match search.run(|trial| bench.borrow_mut().run(&plan.of_trial(trial)), hear)? {
+            // A search may take long. Its end by a signal keeps what the search has found.
+            let found = search.run(|trial| bench.borrow_mut().run(&plan.of_trial(trial)), hear).map_err(|stop| match stop {
+                Stop::Signal(number, _) => Stop::Signal(number, answer::so_far(arguments, plan, &seeds, smallest.as_ref())),
+                Stop::Failed(_) | Stop::Failure(_) => stop,
+            });
+            match found? {
                 Found::Nothing => Verdict::Passed,
                 Found::Elsewhere => Verdict::Elsewhere,
                 Found::Case(case, count) => {
@@ -187,7 +196,7 @@ impl<'a> Bench<'a> {
         };
         let outcome = cohaptic_exec::run(plan, &keep).map_err(Stop::Failed)?;
         if let Some(signal) = outcome.signal {
-            return Err(Stop::Signal(signal));
+            return Err(Stop::Signal(signal, String::new()));
         }
         self.runs += 1;
         self.late += u64::from(!outcome.report.validity.is_valid());

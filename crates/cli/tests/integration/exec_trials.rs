@@ -95,7 +95,29 @@ fn a_search_says_what_is_not_due_to_lost_packets() {
     }
     let outcome = running.end_by("-TERM");
     assert_eq!((outcome.status, outcome.stdout.lines().count()), (Some(143), 2), "{outcome:?}");
-    assert!(outcome.stderr.contains("a signal has ended the trials"), "{}", outcome.stderr);
+    assert_eq!(outcome.stderr, "interrupted: a signal has ended the trials\n");
+}
+
+/// A signal in the midst of a search keeps the failed seeds, and the smallest case found so far, with its command line.
+#[test]
+fn an_ended_search_says_what_it_has_found() {
+    if !can_run() {
+        return;
+    }
+    let desk = Desk::new();
+    // Run 1 passes, two seeds and their case fail, and the run after these waits for the signal.
+    let script = "echo ready >>tried; n=$(wc -l <tried); [ $n -lt 6 ] || sleep 1000; [ $n -eq 1 ]";
+    let mut command = desk.command(&format!("exec 'delay 1ms' --seeds 1..2 --runs 2 --no-priority -- sh -c '{script}'"));
+    command.process_group(0);
+    let running = Running::begin(command);
+    while desk.files("").iter().all(|name| name != "tried") || desk.read("tried").lines().count() < 6 {
+        thread::sleep(Duration::from_millis(10));
+    }
+    let outcome = running.end_by("-TERM");
+    assert_eq!(outcome.status, Some(143), "{outcome:?}");
+    let found =
+        "trials\n2 of 2 seeds fail: 1, 2\nthe command fails 2 of 2 times without a lost packet:\n  cohaptic exec 'delay 1ms' --lose none -- sh -c ";
+    assert!(outcome.stderr.contains(found), "{}", outcome.stderr);
 }
 
 /// Under `--json` standard output has the document alone, for a command and for a file.
