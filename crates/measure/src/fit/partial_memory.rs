@@ -130,11 +130,16 @@ mod tests {
 
     use super::super::{correlation, independence};
     use super::*;
+    use crate::series::NORMAL_975;
     use crate::tests::TestRng;
 
-    /// Packets every 8 ms in the mean, a tenth of them lost, with delays of a skewed law: the share `share` of the variance of the normal numbers has the
-    /// correlation time `time`.
-    fn arrivals(seed: u64, packets: usize, (time, share): (f64, f64), even: bool) -> Vec<(f64, f64)> {
+    /// Returns packets every 8 ms in the mean, a tenth of them lost, with delays of a skewed law: the share `share` of the variance of the normal numbers has
+    /// the correlation time `time`.
+    fn arrivals(seed: u64, packets: usize, memory: (f64, f64), even: bool) -> Vec<(f64, f64)> {
+        arrivals_with_loss(0.1, seed, packets, memory, even)
+    }
+
+    fn arrivals_with_loss(loss: f64, seed: u64, packets: usize, (time, share): (f64, f64), even: bool) -> Vec<(f64, f64)> {
         let mut rng = TestRng::new(seed);
         let (mut now, mut level): (f64, f64) = (0.0, StandardNormal.sample(&mut rng));
         let mut arrivals = Vec::new();
@@ -145,7 +150,7 @@ mod tests {
             let [noise, jitter]: [f64; 2] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
             level = phi * level + (1.0 - phi * phi).sqrt() * noise;
             now += gap;
-            if rng.unit() > 0.1 {
+            if rng.unit() >= loss {
                 let score = share.sqrt() * level + (1.0 - share).sqrt() * jitter;
                 arrivals.push((now, 0.02 + 0.004 * (0.6 * score).exp()));
             }
@@ -163,8 +168,79 @@ mod tests {
             assert!((fit.time_s / time).ln().abs() < 4.0 * time_se / fit.time_s && time_se < 0.5 * time, "{fit:?}");
             assert!((fit.share - share).abs() < 4.0 * share_se && share_se < 0.1, "{fit:?}");
             assert!((fit.lag_one - share * (-0.008 / time).exp()).abs() < 4.0 * lag_se, "{fit:?}");
+            // An innovation is in units of its own deviation: over 18 000 packets the mean square has the standard error √(2/n) = 0.011.
+            let squares = innovations.iter().map(|innovation| innovation * innovation).sum::<f64>();
+            assert!((squares / count(innovations.len()) - 1.0).abs() < 0.05, "{squares}");
             // The memory consists of the two numbers, so that the innovations are independent.
             assert!(independence::test(&innovations.into_iter().map(Some).collect::<Vec<_>>()).unwrap().holds(), "{fit:?}");
+        }
+    }
+
+    /// Returns the expected standard errors of ln τ, s and s·e^{−Δ/τ} for `n` scores of unknown variance, Δ = 8 ms apart. The information of two parameters is
+    /// n/2 times the covariance, over the frequencies, of the derivatives of the logarithm of the spectrum (Whittle 1953, Arkiv för Matematik 2(5)).
+    fn expected_errors(n: usize, time: f64, share: f64) -> [f64; 3] {
+        const FREQUENCIES: u32 = 10_000;
+        const SMALL: f64 = 1e-5;
+        let lag_one = |log_time: f64| (-0.008 / log_time.exp()).exp();
+        let along = |of: &dyn Fn(f64, f64) -> f64| {
+            let at = |by_time: f64, by_share: f64| of(time.ln() + by_time * SMALL, share + by_share * SMALL);
+            [at(1.0, 0.0) - at(-1.0, 0.0), at(0.0, 1.0) - at(0.0, -1.0)].map(|difference| difference / (2.0 * SMALL))
+        };
+        let derivatives: Vec<[f64; 2]> = (0..FREQUENCIES)
+            .map(|place| (std::f64::consts::PI * (f64::from(place) + 0.5) / f64::from(FREQUENCIES)).cos())
+            .map(|cosine| {
+                along(&|log_time, share| {
+                    let phi = lag_one(log_time);
+                    (share * (1.0 - phi * phi) / (1.0 - 2.0 * phi * cosine + phi * phi) + 1.0 - share).ln()
+                })
+            })
+            .collect();
+        let mean = |of: &dyn Fn(&[f64; 2]) -> f64| derivatives.iter().map(of).sum::<f64>() / f64::from(FREQUENCIES);
+        // An unknown variance raises the spectrum alike at all frequencies, so that only differences from the mean tell of the other parameters.
+        let information = |one: usize, other: usize| count(n) / 2.0 * (mean(&|at| at[one] * at[other]) - mean(&|at| at[one]) * mean(&|at| at[other]));
+        let [time_time, both, share_share] = [information(0, 0), information(0, 1), information(1, 1)];
+        let determinant = time_time * share_share - both * both;
+        let error = |of: &dyn Fn(f64, f64) -> f64| {
+            let [by_time, by_share] = along(of);
+            ((by_time.powi(2) * share_share - 2.0 * by_time * by_share * both + by_share.powi(2) * time_time) / determinant).sqrt()
+        };
+        [error(&|log_time, _| log_time), error(&|_, share| share), error(&|log_time, share| share * lag_one(log_time))]
+    }
+
+    /// The curvature of 20 000 scores differs from the expected curvature by a few hundredths.
+    #[test]
+    fn standard_errors_are_those_of_the_spectrum() {
+        for (seed, time, share) in [(1, 0.5, 0.6), (2, 0.1, 0.3), (3, 0.03, 0.7), (4, 0.2, 0.95)] {
+            let fit = correlation::fit(&arrivals_with_loss(0.0, seed, 20_000, (time, share), true), 0.008).unwrap().0;
+            let [time_se, share_se, lag_se] = [fit.time_se_s, fit.share_se, fit.lag_one_se].map(Option::unwrap);
+            // 1.96 errors of the time reach the farther end of the interval of ln τ.
+            let log_time_se = (1.0 + NORMAL_975 * time_se / fit.time_s).ln() / NORMAL_975;
+            for (found, expected) in [log_time_se, share_se, lag_se].into_iter().zip(expected_errors(20_000, fit.time_s, fit.share)) {
+                assert!((found / expected - 1.0).abs() < 0.1, "{found} {expected} {fit:?}");
+            }
+        }
+    }
+
+    /// The least gain is the value of χ² that two further parameters exceed with probability 0.001, which is −2·ln 0.001 = 13.8.
+    #[test]
+    fn a_share_must_gain_the_quantile_of_chi_squared() {
+        let arrivals = arrivals(6, 2_000, (0.5, 0.95), true);
+        let scores = correlation::normal_scores(&arrivals.iter().map(|arrival| arrival.1).collect::<Vec<_>>());
+        let gain = fit(&arrivals, &scores, 0.008, 0.0).unwrap().0.likelihood_ratio;
+        let quantile = -2.0 * 0.001_f64.ln();
+        for (left, has_share) in [(quantile + 0.1, true), (quantile - 0.1, false)] {
+            assert_eq!(fit(&arrivals, &scores, 0.008, gain - left).is_some(), has_share, "{left}");
+        }
+    }
+
+    /// A level that drifts for the whole measurement of 16 s has no time of its own: the time is no longer than the measurement.
+    #[test]
+    fn no_time_outlasts_the_measurement() {
+        for seed in 0..4 {
+            let arrivals = arrivals(seed, 2_000, (1e4, 0.5), true);
+            let drifting: Vec<_> = arrivals.into_iter().map(|(now, delay)| (now, delay + 0.0005 * now)).collect();
+            let (fit, _) = correlation::fit(&drifting, 0.008).unwrap();
+            assert!(fit.share < 1.0 && fit.time_s <= 16.0, "{fit:?}");
         }
     }
 
