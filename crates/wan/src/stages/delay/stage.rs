@@ -420,6 +420,18 @@ mod tests {
     }
 
     #[test]
+    fn a_share_of_one_is_the_whole_memory() {
+        for distribution in [Distribution::Normal, Distribution::Gamma] {
+            let with = |correlation| {
+                let jitter = Jitter { correlation, ..Jitter::new(2 * MILLISECOND, distribution.clone()) };
+                draws(&Delay::with_jitter(24 * MILLISECOND, jitter).unwrap(), 1_000, 8 * MILLISECOND)
+            };
+            let time = 76 * MILLISECOND;
+            assert_eq!(with(Correlation::PartlyInTime { time, share: 1.0 }), with(Correlation::InTime(time)), "{distribution:?}");
+        }
+    }
+
+    #[test]
     fn a_normal_law_that_reaches_zero_is_cut_there() {
         let wide = Delay::with_jitter(MILLISECOND, Jitter::new(2 * MILLISECOND, Distribution::Normal)).unwrap();
         assert_eq!(wide.least(), Duration::ZERO);
