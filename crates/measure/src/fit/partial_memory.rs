@@ -207,7 +207,7 @@ mod tests {
         [error(&|log_time, _| log_time), error(&|_, share| share), error(&|log_time, share| share * lag_one(log_time))]
     }
 
-    /// The curvature of 20 000 scores differs from the expected curvature by a few hundredths.
+    /// The curvature of 20 000 scores differs from the expected curvature, so that the errors differ by up to 1.2 %.
     #[test]
     fn standard_errors_are_those_of_the_spectrum() {
         for (seed, time, share) in [(1, 0.5, 0.6), (2, 0.1, 0.3), (3, 0.03, 0.7), (4, 0.2, 0.95)] {
@@ -216,7 +216,7 @@ mod tests {
             // 1.96 errors of the time reach the farther end of the interval of ln τ.
             let log_time_se = (1.0 + NORMAL_975 * time_se / fit.time_s).ln() / NORMAL_975;
             for (found, expected) in [log_time_se, share_se, lag_se].into_iter().zip(expected_errors(20_000, fit.time_s, fit.share)) {
-                assert!((found / expected - 1.0).abs() < 0.1, "{found} {expected} {fit:?}");
+                assert!((found / expected - 1.0).abs() < 0.03, "{found} {expected} {fit:?}");
             }
         }
     }
