@@ -12,7 +12,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::integration::desk::{Desk, Outcome};
-use crate::integration::running::{PATIENCE, Running};
+use crate::integration::running::{PATIENCE, Running, uninterrupted};
 
 /// Variable that tells a process inside what to do.
 pub(super) const ROLE: &str = "COHAPTIC_CLI_TEST_EXEC";
@@ -194,7 +194,7 @@ fn datagrams_go_out_and_answers_come_back_and_a_farewell_arrives_after_the_end()
     let port = server.local_addr().unwrap().port();
     let answering = thread::spawn(move || {
         let mut data = [0; 64];
-        let (length, from) = server.recv_from(&mut data).unwrap();
+        let (length, from) = uninterrupted(|| server.recv_from(&mut data)).unwrap();
         assert_eq!(&data[..length], b"question");
         server.send_to(b"answer", from).unwrap();
         server
@@ -206,7 +206,7 @@ fn datagrams_go_out_and_answers_come_back_and_a_farewell_arrives_after_the_end()
     // The command ends at once, and its datagram is on the way for 300 ms.
     said_by(&desk, "'delay 300ms'", &format!("tell host:{port}"));
     let mut data = [0; 64];
-    let length = server.recv(&mut data).unwrap();
+    let length = uninterrupted(|| server.recv(&mut data)).unwrap();
     assert_eq!(&data[..length], b"farewell");
 }
 
@@ -369,7 +369,7 @@ fn a_port_of_the_machine_leads_inside() {
     udp.set_read_timeout(Some(PATIENCE)).unwrap();
     udp.send(b"datagram").unwrap();
     let mut data = [0; 64];
-    let length = udp.recv(&mut data).unwrap();
+    let length = uninterrupted(|| udp.recv(&mut data)).unwrap();
     assert_eq!(&data[..length], b"datagram");
     assert_eq!(running.end().status, Some(0));
     // A port that another program has is refused before anything begins.
@@ -389,7 +389,7 @@ fn a_client_is_refused_where_no_command_listens() {
     running.said("ready");
     let mut stream = TcpStream::connect(("127.0.0.1", port)).unwrap();
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
-    assert_eq!(stream.read(&mut [0]).unwrap_err().kind(), ErrorKind::ConnectionReset);
+    assert_eq!(uninterrupted(|| stream.read(&mut [0])).unwrap_err().kind(), ErrorKind::ConnectionReset);
     assert_eq!(running.end_by("-TERM").status, Some(143));
 }
 

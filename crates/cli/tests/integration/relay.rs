@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 
 use crate::integration::desk::{Desk, parse};
-use crate::integration::running::{Client, PATIENCE, Running, TOKEN};
+use crate::integration::running::{Client, PATIENCE, Running, TOKEN, uninterrupted};
 
 fn millis(millis: u64) -> Duration {
     Duration::from_millis(millis)
@@ -26,7 +26,7 @@ fn echo() -> (SocketAddr, thread::JoinHandle<usize>) {
     let answering = thread::spawn(move || {
         let mut buffer = [0; 2048];
         for answered in 0.. {
-            let (length, from) = socket.recv_from(&mut buffer).unwrap();
+            let (length, from) = uninterrupted(|| socket.recv_from(&mut buffer)).unwrap();
             if &buffer[..length] == b"stop" {
                 return answered;
             }
@@ -42,7 +42,7 @@ fn round_trip(client: &UdpSocket, to: SocketAddr, content: &[u8]) -> Duration {
     let begin = Instant::now();
     client.send_to(content, to).unwrap();
     let mut buffer = [0; 2048];
-    let (length, from) = client.recv_from(&mut buffer).unwrap();
+    let (length, from) = uninterrupted(|| client.recv_from(&mut buffer)).unwrap();
     assert_eq!((&buffer[..length], from), (content, to), "the answer comes from where the question went to");
     begin.elapsed()
 }
@@ -147,10 +147,10 @@ fn two_programs_of_a_file_speak_through_their_link_and_strangers_do_not() {
     // It is known from now on.
     right.send_to(b"here", port_of_left).unwrap();
     let mut buffer = [0; 64];
-    assert_eq!(left.recv_from(&mut buffer).unwrap(), (4, port_of_right));
+    assert_eq!(uninterrupted(|| left.recv_from(&mut buffer)).unwrap(), (4, port_of_right));
     let begin = Instant::now();
     left.send_to(b"question", port_of_right).unwrap();
-    assert_eq!(right.recv_from(&mut buffer).unwrap(), (8, port_of_left));
+    assert_eq!(uninterrupted(|| right.recv_from(&mut buffer)).unwrap(), (8, port_of_left));
     assert!(begin.elapsed() >= millis(40));
     // A stranger is turned away.
     socket().send_to(b"?", port_of_right).unwrap();
@@ -244,7 +244,7 @@ fn what_a_seeded_link_loses_is_dropped_and_counted() {
         assert_eq!(document["dropped"], link["dropped"]["loss"]);
         let mut buffer = [0; 8];
         let delivered = (0..link["delivered"].as_u64().unwrap()).map(|_| {
-            server.recv_from(&mut buffer).unwrap();
+            uninterrupted(|| server.recv_from(&mut buffer)).unwrap();
             buffer[0]
         });
         delivered.collect::<Vec<u8>>()

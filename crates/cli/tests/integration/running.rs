@@ -1,6 +1,6 @@
 //! Commands that run until they are stopped, their messages, and their live control.
 
-use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::io::{self, BufRead as _, BufReader, ErrorKind, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 use std::process::{Child, ChildStderr, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
@@ -13,6 +13,17 @@ use crate::integration::desk::Outcome;
 
 /// Time limit of every wait. An awaited event takes milliseconds, but the machine may be busy.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Calls again as long as a signal interrupts the call. A read with a time limit ends with `EINTR` when a handler runs (`signal(7)`), and the process of the tests
+/// handles signals of commands that other tests run in the same process.
+pub(crate) fn uninterrupted<T>(mut call: impl FnMut() -> io::Result<T>) -> io::Result<T> {
+    loop {
+        match call() {
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            result => return result,
+        }
+    }
+}
 
 /// Command in the background, which is ended at the end of the test, also of a failing one.
 pub(crate) struct Running {
