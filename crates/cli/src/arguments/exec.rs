@@ -25,11 +25,11 @@ pub(crate) struct ExecArguments {
     #[arg(long, value_name = "KEY=VALUE", conflicts_with = "command")]
     pub(crate) set: Vec<String>,
     /// Another link from the world to the command, in one argument: --back 'delay 20ms rate 10mbit'
-    #[arg(long, value_name = "SPEC", allow_negative_numbers = true, requires = "command")]
+    #[arg(long, value_name = "SPEC", allow_negative_numbers = true)]
     pub(crate) back: Option<String>,
     /// Lead connections and datagrams that arrive at this port of the machine through the link to the same port of the command, repeatable
     /// [without an address: 127.0.0.1]
-    #[arg(long, value_name = "[ADDRESS:]PORT", value_parser = listened, requires = "command")]
+    #[arg(long, value_name = "[ADDRESS:]PORT", value_parser = listened)]
     pub(crate) listen: Vec<SocketAddr>,
     /// Name server that answers the command's questions [default: the first of /etc/resolv.conf]
     #[arg(long, value_name = "ADDRESS", value_parser = served)]

@@ -26,7 +26,7 @@ const MACHINE: &str = "host";
 pub(super) fn plan(arguments: &ExecArguments) -> Result<Plan, Failure> {
     let plan = match (arguments.command.is_empty(), arguments.spec.as_slice()) {
         (false, _) => of_command(arguments)?,
-        (true, [file]) if Path::new(file).exists() || input::is_standard_input(Path::new(file)) => of_file(arguments, Path::new(file))?,
+        (true, [file]) if is_file(file) => of_file(arguments, Path::new(file))?,
         (true, spec) => {
             return Err(Failure::Input(format!(
                 "{:?} is not a file: expected a file of hosts, or a command after two dashes: cohaptic exec 'delay 50ms loss 1%' -- curl http://host:8000/",
@@ -41,9 +41,20 @@ pub(super) fn plan(arguments: &ExecArguments) -> Result<Plan, Failure> {
     Ok(plan.losing(&lost))
 }
 
+/// Returns whether a spec names a file of hosts.
+fn is_file(spec: &str) -> bool {
+    Path::new(spec).exists() || input::is_standard_input(Path::new(spec))
+}
+
 /// Returns the plan of a single command, with the link between the command and the real world.
 fn of_command(arguments: &ExecArguments) -> Result<Plan, Failure> {
-    let there = link(&arguments.spec)?;
+    // A file may have the name of a link, such as starlink. So a spec is taken for a file only if the spec is no link.
+    let there = link(&arguments.spec).map_err(|failure| match arguments.spec.as_slice() {
+        [file] if is_file(file) => Failure::Input(format!(
+            "{file} is a file, whose hosts have commands of their own: expected no command after two dashes. A host's command is its key command under [[hosts]]"
+        )),
+        _ => failure,
+    })?;
     let back = arguments.back.as_ref().map_or_else(|| Ok(there.clone()), |words| link(std::slice::from_ref(words)))?;
     let gateway = GatewayPlan { listen: arguments.listen.clone(), ..gateway(arguments, WORLD) };
     let command = HostPlan {
@@ -60,6 +71,18 @@ fn of_command(arguments: &ExecArguments) -> Result<Plan, Failure> {
 
 /// Returns the plan of a file.
 fn of_file(arguments: &ExecArguments, path: &Path) -> Result<Plan, Failure> {
+    if arguments.back.is_some() {
+        return Err(Failure::Input(format!(
+            "--back is the way back to a command after two dashes. The file {} has its own links: expected [[links]] with from and to there, or --set links.FROM.TO.delay=20ms",
+            path.display()
+        )));
+    }
+    if !arguments.listen.is_empty() {
+        return Err(Failure::Input(format!(
+            "--listen leads to a command after two dashes. Hosts of the file {} are reached by each other: expected a client as a further host, whose command is its key command under [[hosts]]",
+            path.display()
+        )));
+    }
     let file = input::with(path, |text, name| ExecFile::parse(text, name, &arguments.set))?;
     let gateway = file.world.as_ref().map(|name| gateway(arguments, name));
     let hosts = file.hosts.iter().enumerate().map(|(place, of)| {
@@ -119,5 +142,13 @@ fn link(spec: &[String]) -> Result<LinkModel, Failure> {
     // A key has an equals sign, and its value may have spaces.
     let words =
         spec.iter().flat_map(|text| if text.contains('=') { vec![text.clone()] } else { text.split_whitespace().map(str::to_owned).collect() });
-    link_and_keys(&words.collect::<Vec<_>>()).map(|(model, _)| model)
+    let words: Vec<String> = words.collect();
+    if words.is_empty() {
+        // Most often a variable of a script that is not set. An ideal network in its place would hide the mistake.
+        return Err(Failure::Input(
+            "an empty text is no link: expected words such as 'delay 50ms loss 1%', a link such as starlink, or 'delay 0ms' for an ideal link"
+                .to_owned(),
+        ));
+    }
+    link_and_keys(&words).map(|(model, _)| model)
 }

@@ -11,6 +11,7 @@ use crate::arguments::ExecArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::output;
+use crate::realtime::say;
 
 /// Runs of a set of lost packets, unless `--runs` says otherwise.
 const RUNS: u32 = 5;
@@ -135,9 +136,11 @@ impl<'a> Bench<'a> {
         Plan { hosts: hosts.collect(), captures: None, ..plan.clone() }
     }
 
-    /// Prints a line, unless a JSON document is wanted.
+    /// Prints a line. Under `--json` standard output is for the document alone, and the line tells on standard error how far the trials are.
     fn say(&mut self, line: &str) {
-        if !self.arguments.json && self.unsaid.is_none() {
+        if self.arguments.json {
+            say(line);
+        } else if self.unsaid.is_none() {
             self.unsaid = output::text(&format!("{line}\n")).err();
         }
     }

@@ -12,8 +12,8 @@ use std::time::Duration;
 
 use cohaptic_device::Device;
 use cohaptic_harness::live::RecordedScene;
+use cohaptic_live::Label;
 use cohaptic_live::join::{Join, JoinConfig, JoinError, JoinReport, JoinedConfig, JoinedStatus};
-use cohaptic_live::{Label, SessionKey};
 use cohaptic_scene::{PeerKind, Scene};
 
 use crate::arguments::{JoinArguments, JoinDevice};
@@ -23,7 +23,7 @@ use crate::file::own_folder;
 use crate::live::exchanges::DeviceFacts;
 use crate::live::{devices, exchanges};
 use crate::progress::Progress;
-use crate::realtime::{say, some_length};
+use crate::realtime::{say, session_key, some_length};
 use crate::{input, interrupt, output};
 use joined::Joined;
 
@@ -36,10 +36,7 @@ pub(crate) fn join(arguments: &JoinArguments) -> Result<ExitCode, Failure> {
     let place = place(&theirs, path, &arguments.peer)?;
     let scene = input::with(path, |text, file| Scene::parse_live(text, file, &here(arguments)))?;
     let identity = RecordedScene::fingerprint_of(&theirs);
-    let key = match &arguments.key_file {
-        None => None,
-        Some(file) => Some(SessionKey::read_from(file).map_err(|error| Failure::Input(error.to_string()))?),
-    };
+    let key = session_key(arguments.key_file.as_deref())?;
     let is_keyed = key.is_some();
     let _own = arguments.out.as_deref().map(own_folder).transpose()?;
     let config = JoinConfig {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use cohaptic_linkfile::library::{self, Direction, ProfileName};
 use cohaptic_linkfile::link_from_keys;
+use cohaptic_linkfile::stream::first_fault;
 use cohaptic_measure::asked::Asked;
 use cohaptic_scene::LinkKeys;
 use cohaptic_wan::law::DistTable;
@@ -88,7 +89,22 @@ fn of_keys(spec: &[String], arguments: &LinkArguments) -> Result<(LinkModel, Ask
 
 /// Returns the link of the words of tc-netem or of the keys, and the keys of the link. Words are stored under the single key `netem`. An empty `spec` gives an
 /// ideal link.
+///
+/// # Errors
+///
+/// The fault in the words or keys. A fault of TCP's connections, which links of packets do not have, is told with the command that has the fault.
 pub(crate) fn link_and_keys(spec: &[String]) -> Result<(LinkModel, LinkKeys), Failure> {
+    let of_tcp = |name| {
+        let command = "cohaptic relay --tcp --listen 127.0.0.1:7000 --to 127.0.0.1:8000";
+        Failure::Input(format!(
+            "{name} is a fault of connections of TCP, and this link carries packets: expected another word, or {command} {name} …"
+        ))
+    };
+    // Only a refused spec is searched for such a name: words of tc-netem may be shortened, and a valid spec decides itself what its words mean.
+    read(spec).map_err(|failure| first_fault(spec).map_or(failure, of_tcp))
+}
+
+fn read(spec: &[String]) -> Result<(LinkModel, LinkKeys), Failure> {
     let nothing = LinkKeys::default();
     if spec.is_empty() {
         return Ok((LinkModel::default(), nothing));

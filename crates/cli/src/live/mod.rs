@@ -26,7 +26,7 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::{self, Failure, INTERRUPTED};
 use crate::file::{own_folder, write_file};
 use crate::progress::Progress;
-use crate::realtime::{ControlFiles, KeyedLinks, LiveControl, own_address, say};
+use crate::realtime::{ControlFiles, KeyedLinks, LiveControl, own_address, say, session_key};
 use crate::run::page::edits;
 use crate::{input, interrupt, output};
 use exchanges::DeviceFacts;
@@ -125,10 +125,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
 fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent, identity: Fingerprint) -> Result<Option<(Session, DeviceFacts)>, Failure> {
     let real_time = &arguments.real_time;
     // The key is read first: a wrong file is refused before devices are homed.
-    let key = match &arguments.key_file {
-        None => None,
-        Some(file) => Some(SessionKey::read_from(file).map_err(|error| Failure::Input(error.to_string()))?),
-    };
+    let key = session_key(arguments.key_file.as_deref())?;
     let config = SessionConfig {
         allow_remote: real_time.allow_remote,
         key,

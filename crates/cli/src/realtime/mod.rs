@@ -4,6 +4,8 @@ mod addresses;
 mod control;
 #[cfg(target_os = "linux")]
 mod control_files;
+#[cfg(target_os = "linux")]
+mod session_key;
 mod words;
 
 use std::time::Duration;
@@ -20,6 +22,8 @@ pub(crate) use control::{Edit, KeyedLinks};
 pub(crate) use control::{LiveControl, Look, counters, quantiles, quantiles_of, refused_server, token_of};
 #[cfg(target_os = "linux")]
 pub(crate) use control_files::ControlFiles;
+#[cfg(target_os = "linux")]
+pub(crate) use session_key::session_key;
 #[cfg(target_os = "linux")]
 pub(crate) use words::notes;
 pub(crate) use words::{ConfiguredDelay, Publisher, carried, counts, late, say, some_length, status, unicode_words};

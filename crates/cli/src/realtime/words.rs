@@ -16,6 +16,7 @@ use cohaptic_wan::{DropCause, LinkModel, LinkStats};
 use super::Look;
 use crate::document_schema::micros;
 use crate::failure::Failure;
+use crate::output;
 
 /// Formats a summary of lateness: `p50 31.2 µs, p99 76.0 µs, p99.9 120.0 µs, worst 1.20 ms`.
 pub(crate) fn late(summary: &LatenessSummary) -> String {
@@ -54,8 +55,11 @@ pub(crate) fn notes(prepared: &Prepared, validity: Validity) -> String {
     text
 }
 
-/// Prints a line on standard error, with control characters escaped.
+/// Prints a line on standard error, with control characters escaped. Prints nothing under `--quiet`, which keeps standard error for errors.
 pub(crate) fn say(line: &str) {
+    if output::is_quiet() {
+        return;
+    }
     // A failed write to standard error does not keep the run from beginning.
     let _ = writeln!(io::stderr(), "{}", visible_lines(line));
 }

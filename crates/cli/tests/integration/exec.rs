@@ -303,6 +303,34 @@ fn the_status_is_that_of_the_command() {
     assert_eq!(desk.cohaptic_within(PATIENCE, "exec 'delay 1ms' -- sh -c 'sleep 1000 & exit 3'").status, Some(3));
 }
 
+/// Nothing is run, so that no namespaces are needed.
+#[test]
+fn a_wrong_call_is_told_with_what_was_expected() {
+    let desk = Desk::new();
+    desk.write("net.toml", "[[hosts]]\n");
+    let command_of_hosts =
+        "net.toml is a file, whose hosts have commands of their own: expected no command after two dashes. A host's command is its key command";
+    for (line, part) in [
+        ("exec net.toml -- true", command_of_hosts),
+        ("exec net.toml --listen 8080 -- true", command_of_hosts),
+        (
+            "exec net.toml --back 'delay 1ms'",
+            "net.toml has its own links: expected [[links]] with from and to there, or --set links.FROM.TO.delay=20ms",
+        ),
+        ("exec net.toml --listen 8080", "Hosts of the file net.toml are reached by each other: expected a client as a further host"),
+        ("exec 'delay 1ms' --back 'delay 2ms'", "\"delay 1ms\" is not a file: expected a file of hosts, or a command after two dashes"),
+        ("exec '' -- true", "an empty text is no link: expected words such as 'delay 50ms loss 1%'"),
+        ("exec ' ' -- true", "an empty text is no link"),
+        ("exec 'delay 1ms' --back '' -- true", "an empty text is no link"),
+        (
+            "exec 'delay 1ms stall 2s' -- true",
+            "stall is a fault of connections of TCP, and this link carries packets: expected another word, or cohaptic relay --tcp",
+        ),
+    ] {
+        desk.cohaptic_within(PATIENCE, line).assert_refused(125, &[part]);
+    }
+}
+
 /// A signal reaches the command once, whether it was sent to the program alone or to its whole process group, as the terminal does on Ctrl-C.
 #[test]
 fn a_signal_reaches_the_command_once() {

@@ -85,6 +85,9 @@ fn a_search_says_what_is_not_due_to_lost_packets() {
     let outcome = desk.cohaptic("exec 'delay 1ms loss 1%' --seeds 1..3 --no-priority --json -- true");
     let document = parse(&outcome.stdout);
     assert_eq!((outcome.status, &document["verdict"], document["seeds"].as_array().unwrap().len()), (Some(0), &json!("passed"), 3));
+    // The steps of the search go to standard error, where `-q` leaves out all but errors.
+    assert!(outcome.stderr.contains("losing nothing: passes\n") && outcome.stderr.contains("seed 3: passes"), "{}", outcome.stderr);
+    assert_eq!(desk.cohaptic("exec 'delay 1ms loss 1%' --seeds 1..3 --no-priority --json -q -- true").stderr, "");
 
     let mut command =
         desk.command("exec 'delay 1ms' --runs 100 --no-priority -- sh -c 'echo ready >>said; sleep 0.1; [ $(wc -l <said) -lt 3 ] || sleep 1000'");

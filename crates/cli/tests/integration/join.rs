@@ -207,6 +207,13 @@ fn a_wrong_key_scene_place_or_kind_is_a_sentence() {
     // A session with a key does not answer a `join` without a key, and the key is among the possible reasons.
     join("--peer left --for 300ms").assert_refused(3, &["nothing from 127.0.0.1:", "it has a key, which --key-file must name here, too"]);
 
+    // A file that is not there has the status of a scene that is not there, and a file without a key is a wrong input.
+    desk.write("empty.key", "");
+    desk.set_mode("empty.key", 0o600);
+    for (file, status, part) in [("gone.key", 3, "cannot read the key file gone.key"), ("empty.key", 2, "empty.key is not a key file")] {
+        join(&format!("--peer left --key-file {file}")).assert_refused(status, &[part]);
+        desk.cohaptic(&format!("live lab.toml --key-file {file} {UNHURRIED}")).assert_refused(status, &[part]);
+    }
     join("--peer third --key-file session.key").assert_refused(2, &["--peer third: ", "lab.toml has no such peer: expected left"]);
     let kind = "in lab.toml its kind is \"simulated\", so the session itself computes it: expected kind = \"udp\"";
     join("--peer right --key-file session.key").assert_refused(2, &["--peer right: ", kind]);

@@ -111,6 +111,14 @@ const OTHERS: &[Bad] = &[
         "relay --listen localhost:0 --to localhost:9 delay 20ms --back loss=1% delay 2ms",
         "a link is written either in words of tc-netem or in keys of a scene, not in both: delay 2ms is of the first kind, loss=1% of the second. Write all in one kind, such as delay 20ms loss 1%, or delay=20ms loss=1%; put a value with spaces in quotes, 'jitter={ sd = \"2ms\" }'",
     ),
+    bad(
+        "relay --listen localhost:0 --to localhost:9 delay 20ms stall 2s",
+        "stall is a fault of connections of TCP, and this link carries packets: expected another word, or cohaptic relay --tcp --listen 127.0.0.1:7000 --to 127.0.0.1:8000 stall …",
+    ),
+    bad(
+        "relay --tcp --listen localhost:0 --to localhost:9 stall x",
+        "stall: found x: expected stall AFTER [LENGTH], and then for SHARE if only some connections have it, such as 10ms or 100B",
+    ),
     bad("fit bin", "bin:2: not UTF-8: expected a text file"),
 ];
 

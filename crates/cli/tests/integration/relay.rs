@@ -125,6 +125,17 @@ fn a_signal_gives_the_report_in_words() {
     answering.join().unwrap();
 }
 
+/// The report is the answer, and standard error is for errors alone.
+#[test]
+fn a_quiet_relay_says_nothing_but_its_report() {
+    let desk = Desk::new();
+    for words in ["", "--tcp "] {
+        let outcome = desk.cohaptic(&format!("relay -q {words}--listen 127.0.0.1:0 --to 127.0.0.1:9 --for 10ms"));
+        assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""), "{words}");
+        assert!(outcome.stdout.contains(" -> 127.0.0.1:9\n"), "{}", outcome.stdout);
+    }
+}
+
 #[test]
 fn two_programs_of_a_file_speak_through_their_link_and_strangers_do_not() {
     let (left, right) = (socket(), socket());

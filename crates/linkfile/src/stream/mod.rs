@@ -13,7 +13,7 @@ use cohaptic_wan::{Bottleneck, Impairments, LinkConfig, LinkModel, Loss, Order, 
 
 pub(crate) use read::read_stream;
 pub use read::stream_of_keys;
-pub use words::{FaultWords, split_faults};
+pub use words::{FaultWords, first_fault, split_faults};
 
 /// Treatment of the bytes of one direction: the line that all connections of a proxy share, the bound on held bytes, and the faults of single connections.
 #[derive(Clone, PartialEq, Debug, Default)]

@@ -45,7 +45,8 @@ pub fn split_faults(spec: &[String]) -> Result<FaultWords, String> {
         } else {
             None
         };
-        split.add(word, value_of(word, &values, share)?)?;
+        let next = words.peek().copied();
+        split.add(word, value_of(word, &values, share, next)?)?;
     }
     Ok(split)
 }
@@ -60,12 +61,21 @@ impl FaultWords {
     }
 }
 
+/// Returns the name of the first fault in a spec, written as a word or as a key. Serves messages about specs of packets, which have none of these faults.
+#[must_use]
+pub fn first_fault(spec: &[String]) -> Option<&'static str> {
+    let words = spec.iter().flat_map(|text| text.split_whitespace());
+    // A key ends at the equals sign. The value of a key never is the name of a fault.
+    let mut names = words.map(|word| word.split_once('=').map_or(word, |(key, _)| key));
+    names.find_map(|name| FAULTS.iter().find(|key| key.name == name)).map(|key| key.name)
+}
+
 fn is_fault(word: &str) -> bool {
     FAULTS.iter().any(|key| key.name == word)
 }
 
-/// Returns the value of a fault as TOML.
-fn value_of(word: &str, values: &[&str], share: Option<&str>) -> Result<String, String> {
+/// Returns the value of a fault as TOML. `next` is the word after the values and the share, for messages.
+fn value_of(word: &str, values: &[&str], share: Option<&str>, next: Option<&str>) -> Result<String, String> {
     // Names of the values, sizes and times apart: both have units, so that their order does not matter.
     let (sizes, times): (&[&str], &[&str]) = match word {
         "stall" => (&[], &["after", "length"]),
@@ -85,7 +95,7 @@ fn value_of(word: &str, values: &[&str], share: Option<&str>) -> Result<String, 
             "reset-after" => "reset-after TIME",
             _ => "close-after TIME",
         };
-        let values = if values.is_empty() { "no value".to_owned() } else { values.join(" ") };
+        let values = if values.is_empty() { next.unwrap_or("no value").to_owned() } else { values.join(" ") };
         let share = if word == "buffer" { "" } else { ", and then for SHARE if only some connections have it" };
         format!("{word}: found {values}: expected {usage}{share}, such as 10ms or 100B")
     };
@@ -158,7 +168,9 @@ mod tests {
     #[test]
     fn a_wrong_word_is_told_with_what_was_expected() {
         for (spec, part) in [
-            ("stall", "expected stall AFTER [LENGTH]"),
+            ("stall", "stall: found no value: expected stall AFTER [LENGTH]"),
+            ("stall x", "stall: found x: expected stall AFTER [LENGTH]"),
+            ("stall delay 20ms", "stall: found delay: expected stall AFTER [LENGTH]"),
             ("stall 100B", "expected stall AFTER [LENGTH]"),
             ("slice 10ms", "expected slice SIZE [VARIATION] [GAP]"),
             ("close-after 1s 2s", "expected close-after TIME"),
@@ -170,6 +182,15 @@ mod tests {
             let error = split(spec).unwrap_err();
             assert!(error.contains(part), "{spec}: {error}");
         }
+    }
+
+    #[test]
+    fn a_fault_is_found_among_words_and_keys() {
+        let found = |spec: &[&str]| first_fault(&spec.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>());
+        assert_eq!(found(&["delay", "1ms", "stall", "2s", "slice", "10B"]), Some("stall"));
+        assert_eq!(found(&["delay 1ms slice 10B"]), Some("slice"));
+        assert_eq!(found(&["delay=1ms", "reset-after=2s"]), Some("reset-after"));
+        assert_eq!(found(&["delay", "1ms", "jitter={ sd = \"2ms\" }"]), None);
     }
 
     #[test]
