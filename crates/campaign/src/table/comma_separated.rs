@@ -9,7 +9,7 @@ use super::content::{COMPLETE, DIVERGED, GIST, Gist, Gists, OpenPart, RunColumns
 use super::{Column, Row};
 use crate::value::value_text;
 
-pub(super) fn write(to: &mut impl Write, columns: &[Column], rows: &[Row]) -> io::Result<()> {
+pub(super) fn write(to: &mut dyn Write, columns: &[Column], rows: &[Row]) -> io::Result<()> {
     let mut to = csv::Writer::from_writer(to);
     to.write_record(columns.iter().map(|column| &column.name)).map_err(unwritten)?;
     for row in rows {

@@ -28,8 +28,9 @@ impl Format {
         }
     }
 
-    /// Writes a file with these rows: a part.
-    pub(crate) fn write(self, to: &mut (impl Write + Send), head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
+    /// Writes a file with these rows: a part. Not generic over the writer: every type of writer, here and in other crates, would compile the writer of Parquet
+    /// again.
+    pub(crate) fn write(self, to: &mut (dyn Write + Send), head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
         match self {
             Self::Parquet => parquet_file::write(to, head, rows),
             Self::Csv => Ok(comma_separated::write(to, head.columns, rows)?),

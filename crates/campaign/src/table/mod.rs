@@ -40,7 +40,7 @@ pub type Row = Vec<Value>;
 /// The error of the writer, or [`io::ErrorKind::Other`] for rows that do not have the columns.
 pub fn write_table(
     format: Format,
-    to: &mut (impl Write + Send),
+    to: &mut (dyn Write + Send),
     columns: &[Column],
     rows: &[Row],
     (about, program): ((&str, &str), &str),

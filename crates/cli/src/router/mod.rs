@@ -131,7 +131,7 @@ fn route(
     let tolerance = arguments.real_time.pace.tolerance();
     let judged = |router: &Router| tolerance.judge(router.lateness(), "packets");
     let mut asked: Vec<ConfiguredDelay> = file.links.iter().flat_map(|link| [ConfiguredDelay::of(&link.model); 2]).collect();
-    let ended = router.run(stop, until, LOOK, |router| {
+    let ended = router.route(stop, until, LOOK, &mut |router| {
         for Edit { link: lane, model, .. } in wanted.try_iter() {
             // Each link has two lanes in the description: `lane / 2` is the link, `lane % 2` is the side that packets come from.
             let (Some(link), Some(asked)) = (file.links.get(lane / 2), asked.get_mut(lane)) else { continue };

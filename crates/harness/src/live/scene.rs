@@ -158,11 +158,21 @@ impl LiveScene {
         model: &LinkModel,
         observer: &mut O,
     ) -> Result<Option<Instant>, O::Error> {
-        let (from, to) = ends;
+        Erased::run(observer, |observer| self.take_link(at, ends, keys, model, observer))
+    }
+
+    fn take_link(
+        &mut self,
+        at: Instant,
+        (from, to): (usize, usize),
+        keys: &LinkKeys,
+        model: &LinkModel,
+        observer: &mut AnyObserver<'_>,
+    ) -> Result<Option<Instant>, Ended> {
         if self.link_stats(from, to).is_none() {
             return Ok(None);
         }
-        let Some(at) = Erased::run(observer, |observer| self.come_in(at, observer))? else { return Ok(None) };
+        let Some(at) = self.come_in(at, observer)? else { return Ok(None) };
         each!(&mut self.world, world => world.take_link(at, from, to, model));
         observer.on_input(&InputRow { at, what: Input::Link { from, to, keys } })?;
         Ok(Some(at))

@@ -196,7 +196,12 @@ impl Join {
     /// # Errors
     ///
     /// [`JoinError`] if the session differs from the scene, if the record cannot be written, or if the system does not let the loop wait or receive.
-    pub fn run(mut self, mut look: impl FnMut(&JoinedStatus) -> ControlFlow<()>) -> Result<JoinReport, JoinError> {
+    pub fn run(self, mut look: impl FnMut(&JoinedStatus) -> ControlFlow<()>) -> Result<JoinReport, JoinError> {
+        self.run_looked_at(&mut look)
+    }
+
+    /// The loop of [`Join::run`], compiled once here. With a generic closure, each program would compile the loop again, at its own level of optimisation.
+    fn run_looked_at(mut self, look: &mut dyn FnMut(&JoinedStatus) -> ControlFlow<()>) -> Result<JoinReport, JoinError> {
         let prepared = prepare_thread(&self.config.wishes);
         let schedule = Schedule { pacing: self.config.pacing, end: None, look_every: LOOK };
         let driven = drive(&mut self, &schedule, |join, now| look(&join.peer.status(now)));

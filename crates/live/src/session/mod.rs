@@ -171,8 +171,8 @@ impl Session {
         })
     }
 
-    /// Drives the session to its end, and then shows the final state to the conductor.
-    fn conduct(&mut self, conductor: &mut impl Conductor) -> Result<(), SessionError> {
+    /// Drives the session to its end, and then shows the final state to the conductor. Not generic, so that the loop is compiled once, in this crate.
+    fn conduct(&mut self, conductor: &mut dyn Conductor) -> Result<(), SessionError> {
         self.watch.is_shown = conductor.wants_status();
         self.watch.ended = conductor.wants_motion().then(Default::default);
         let (schedule, mut looks) = (Schedule { pacing: self.config.pacing, end: None, look_every: LOOK }, 0_u32);
@@ -201,7 +201,7 @@ impl Session {
     }
 
     /// Applies the conductor's changes, ends the scene if the conductor says so, and shows the state: the motion at each look, the status if `show`.
-    fn look(&mut self, conductor: &mut impl Conductor, now: Instant, show: bool) -> Result<(), Stopped> {
+    fn look(&mut self, conductor: &mut dyn Conductor, now: Instant, show: bool) -> Result<(), Stopped> {
         // Changes come before the question whether to go on, so that a change made just before the end is in the record.
         while let Some(LinkChange { from, to, keys, model }) = conductor.next_change() {
             self.live.set_link(now, (from, to), &keys, &model, &mut self.watch)?;

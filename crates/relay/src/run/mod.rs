@@ -127,6 +127,17 @@ impl Relay {
         stop: &AtomicBool,
         mut look: impl FnMut(&View<'_>),
     ) -> Result<Report, RelayError> {
+        self.run_looked_at(options, control, stop, &mut look)
+    }
+
+    /// The loop of [`Relay::run`], compiled once here. With a generic closure, each program would compile the loop again, at its own level of optimisation.
+    fn run_looked_at(
+        &mut self,
+        options: &RunOptions,
+        control: &Receiver<Control>,
+        stop: &AtomicBool,
+        look: &mut dyn FnMut(&View<'_>),
+    ) -> Result<Report, RelayError> {
         let prepared = prepare_thread(&options.wishes);
         let clock = MonotonicClock::start();
         let end = options.duration.map(|duration| Instant::ZERO.saturating_add(duration));

@@ -77,6 +77,16 @@ impl Router {
         let devices = AnyDevice::open_both(&file.left, &file.right)?;
         Ok(Self::with(file, devices, MonotonicClock::start(), pacing))
     }
+
+    /// Calls [`Router::run`], compiled once in this crate for the devices of the system. As a generic function, `run` is compiled again by each program, at the
+    /// program's level of optimisation.
+    ///
+    /// # Errors
+    ///
+    /// As [`Router::run`].
+    pub fn route(&mut self, stop: &AtomicBool, until: Option<Instant>, every: Duration, look: &mut dyn FnMut(&mut Self)) -> Result<(), RunError> {
+        self.run(stop, until, every, look)
+    }
 }
 
 impl<D: Device, C: Clock> Router<D, C> {

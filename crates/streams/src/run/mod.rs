@@ -118,6 +118,17 @@ impl Streams {
         stop: &AtomicBool,
         mut look: impl FnMut(&View<'_>),
     ) -> Result<Report, StreamsError> {
+        self.run_looked_at(options, control, stop, &mut look)
+    }
+
+    /// The loop of [`Streams::run`], compiled once here. With a generic closure, each program would compile the loop again, at its own level of optimisation.
+    fn run_looked_at(
+        &mut self,
+        options: &RunOptions,
+        control: &Receiver<Control>,
+        stop: &AtomicBool,
+        look: &mut dyn FnMut(&View<'_>),
+    ) -> Result<Report, StreamsError> {
         let begun = Clock::now();
         let clock = || Instant::ZERO.saturating_add(begun.elapsed());
         let end = options.duration.map(|duration| Instant::ZERO.saturating_add(duration));

@@ -26,7 +26,7 @@ use super::{Column, Kind, Row, Value};
 pub(super) use merge::merge;
 pub(super) use read::{read_columns, read_gists};
 
-pub(super) fn write(to: &mut (impl Write + Send), head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
+pub(super) fn write(to: &mut (dyn Write + Send), head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
     let mut writer = SerializedFileWriter::new(to, schema(head.columns)?, properties(head))?;
     let mut group = writer.next_row_group()?;
     for place in 0..head.columns.len() {

@@ -167,9 +167,14 @@ pub fn is_capture(beginning: &[u8]) -> bool {
 /// # Errors
 ///
 /// [`CaptureError`] if a file cannot be read or has no wanted datagrams, or if no datagram of one file is in the other.
-pub fn between(sender: impl Read, receiver: impl Read, port: Option<u16>) -> Result<Matched, CaptureError> {
-    let mut sent = Capture::read(End::Sender, sender, port)?;
-    let mut arrived = Capture::read(End::Receiver, receiver, port)?;
+pub fn between(mut sender: impl Read, mut receiver: impl Read, port: Option<u16>) -> Result<Matched, CaptureError> {
+    let sent = Capture::read(End::Sender, &mut sender, port)?;
+    let arrived = Capture::read(End::Receiver, &mut receiver, port)?;
+    paired(sent, arrived)
+}
+
+/// Finds the packets of one capture in the other.
+fn paired(mut sent: Capture, mut arrived: Capture) -> Result<Matched, CaptureError> {
     let mut pairs = Pairs::of(&sent, &arrived);
     // Splitting and merging change the datagrams, so the matching begins again after each.
     if segments::split(&mut sent, &mut arrived, &pairs) {
