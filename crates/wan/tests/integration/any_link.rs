@@ -57,8 +57,8 @@ pub(crate) fn all_records(model: impl Into<LinkModel>, offered: &[(Duration, Pac
 }
 
 /// Packets of a few bytes, half of them with ECN.
-pub(crate) fn packet() -> impl Strategy<Value = PacketInfo> {
-    (size(), any::<u8>()).prop_map(|(size, bits)| PacketInfo { size, ecn: Ecn::from_bits(bits) })
+pub(crate) fn packet() -> BoxedStrategy<PacketInfo> {
+    (size(), any::<u8>()).prop_map(|(size, bits)| PacketInfo { size, ecn: Ecn::from_bits(bits) }).boxed()
 }
 
 pub(crate) fn packets() -> BoxedStrategy<Vec<(Duration, PacketInfo)>> {
@@ -136,8 +136,8 @@ pub(crate) fn framing() -> BoxedStrategy<Framing> {
     (select(vec![0, 0, 0, -14, -2, 1, 28]), option::weighted(0.3, cells)).prop_map(|(overhead, cells)| Framing { overhead, cells }).boxed()
 }
 
-fn some_rate() -> impl Strategy<Value = cohaptic_units::Rate> {
-    prop_oneof![4 => select(vec![BYTE_A_MICROSECOND, BYTE_A_MICROSECOND / 2]), 1 => 100_000..100_000_000u64].prop_map(rate)
+fn some_rate() -> BoxedStrategy<cohaptic_units::Rate> {
+    prop_oneof![4 => select(vec![BYTE_A_MICROSECOND, BYTE_A_MICROSECOND / 2]), 1 => 100_000..100_000_000u64].prop_map(rate).boxed()
 }
 
 pub(crate) fn token_bucket() -> BoxedStrategy<TokenBucket> {
@@ -148,18 +148,20 @@ pub(crate) fn token_bucket() -> BoxedStrategy<TokenBucket> {
 }
 
 /// Opportunities at some milliseconds, often several at once.
-pub(crate) fn delivery_trace() -> impl Strategy<Value = DeliveryTrace> {
-    (vec(0..3u64, 1..6), 1..8u64).prop_map(|(gaps, bytes)| {
-        let mut at = 1;
-        let lines: Vec<String> = gaps
-            .into_iter()
-            .map(|gap| {
-                at += gap;
-                at.to_string()
-            })
-            .collect();
-        DeliveryTrace::parse(&lines.join("\n"), Bytes::new(bytes)).unwrap()
-    })
+pub(crate) fn delivery_trace() -> BoxedStrategy<DeliveryTrace> {
+    (vec(0..3u64, 1..6), 1..8u64)
+        .prop_map(|(gaps, bytes)| {
+            let mut at = 1;
+            let lines: Vec<String> = gaps
+                .into_iter()
+                .map(|gap| {
+                    at += gap;
+                    at.to_string()
+                })
+                .collect();
+            DeliveryTrace::parse(&lines.join("\n"), Bytes::new(bytes)).unwrap()
+        })
+        .boxed()
 }
 
 pub(crate) fn service() -> BoxedStrategy<Service> {
@@ -254,12 +256,13 @@ pub(crate) fn slots() -> BoxedStrategy<Slots> {
         .boxed()
 }
 
-pub(crate) fn displacement() -> impl Strategy<Value = Displacement> {
+pub(crate) fn displacement() -> BoxedStrategy<Displacement> {
     prop_oneof![
         (1..4u32).prop_map(|gap| Displacement::Jump { gap: gap.try_into().unwrap() }),
         (1..4u32, 0..20u64).prop_map(|(packets, at_most)| Displacement::Behind { packets: packets.try_into().unwrap(), at_most: micros(at_most) }),
         (0..20u64).prop_map(|by| Displacement::Later { by: micros(by) }),
     ]
+    .boxed()
 }
 
 pub(crate) fn reorder() -> BoxedStrategy<Reorder> {
@@ -294,7 +297,7 @@ pub(crate) fn path_trace() -> BoxedStrategy<PathTrace> {
         .boxed()
 }
 
-pub(crate) fn sojourn() -> impl Strategy<Value = Sojourn> {
+pub(crate) fn sojourn() -> BoxedStrategy<Sojourn> {
     let mean = || select(vec![20, 1_000, 100_000u64]).prop_map(micros);
     prop_oneof![
         mean().prop_map(Sojourn::Fixed),
@@ -302,6 +305,7 @@ pub(crate) fn sojourn() -> impl Strategy<Value = Sojourn> {
         mean().prop_map(|mean| Sojourn::Uniform(mean / 2, mean)),
         (mean(), 1..4u32).prop_map(|(mean, stages)| Sojourn::Erlang(mean, stages)),
     ]
+    .boxed()
 }
 
 pub(crate) fn any_outages() -> BoxedStrategy<Outages> {
@@ -355,7 +359,7 @@ pub(crate) fn any_delay() -> BoxedStrategy<Delay> {
 
 /// Returns a strategy for the impairments that list their own parameters, with random values of each parameter's form.
 #[expect(clippy::panic, reason = "a test may fail")]
-fn listed() -> impl Strategy<Value = Impairments> {
+fn listed() -> BoxedStrategy<Impairments> {
     let value = |form: &Form| match form {
         Form::Duration => (0..60u64).prop_map(|millis| ParameterValue::Duration(Duration::from_millis(millis))).boxed(),
         Form::Number(_) => (0.0..20.0).prop_map(ParameterValue::Number).boxed(),
@@ -375,6 +379,7 @@ fn listed() -> impl Strategy<Value = Impairments> {
         }
         impairments
     })
+    .boxed()
 }
 
 /// Returns a strategy for configurations with the given layout.

@@ -10,8 +10,8 @@ use proptest::prelude::*;
 use crate::random_links::{Plan, any_config, cases, drain_network, plain_config, plan, sendings};
 
 /// Links that only delay. Nothing happens inside of such a network, so that arrivals wait to be polled.
-fn plain_plan() -> impl Strategy<Value = Plan> {
-    vec(plain_config(), 9).prop_map(|links| Plan { nodes: 3, links, uplinks: vec![None; 3], downlinks: vec![None; 3] })
+fn plain_plan() -> BoxedStrategy<Plan> {
+    vec(plain_config(), 9).prop_map(|links| Plan { nodes: 3, links, uplinks: vec![None; 3], downlinks: vec![None; 3] }).boxed()
 }
 
 proptest! {
@@ -54,13 +54,13 @@ proptest! {
 
 /// Four nodes, and links with few different constant delays: many packets of a broadcast arrive together, some of them with packets of other broadcasts, and
 /// some at the instant of their sending.
-fn even_plan() -> impl Strategy<Value = Plan> {
-    vec(even_config(), 16).prop_map(|links| Plan { nodes: 4, links, uplinks: vec![None; 4], downlinks: vec![None; 4] })
+fn even_plan() -> BoxedStrategy<Plan> {
+    vec(even_config(), 16).prop_map(|links| Plan { nodes: 4, links, uplinks: vec![None; 4], downlinks: vec![None; 4] }).boxed()
 }
 
-fn even_config() -> impl Strategy<Value = LinkConfig> {
+fn even_config() -> BoxedStrategy<LinkConfig> {
     let micros = prop_oneof![1 => Just(0), 8 => Just(10), 2 => Just(13)];
-    micros.prop_map(|micros| LinkConfig { delay: Delay::constant(Duration::from_micros(micros)), ..LinkConfig::default() })
+    micros.prop_map(|micros| LinkConfig { delay: Delay::constant(Duration::from_micros(micros)), ..LinkConfig::default() }).boxed()
 }
 
 /// Action of a driver.
@@ -76,7 +76,7 @@ enum Act {
     Change(u16, u16, Box<LinkConfig>),
 }
 
-fn acts() -> impl Strategy<Value = Vec<(u64, Act)>> {
+fn acts() -> BoxedStrategy<Vec<(u64, Act)>> {
     let ends = || (0..4_u16, 1..4_u16).prop_map(|(from, ahead)| (from, (from + ahead) % 4));
     let act = prop_oneof![
         8 => (0..4_u16).prop_map(Act::ToAll),
@@ -84,7 +84,7 @@ fn acts() -> impl Strategy<Value = Vec<(u64, Act)>> {
         6 => (0..9_usize).prop_map(Act::Poll),
         1 => (ends(), prop_oneof![2 => even_config(), 1 => any_config()]).prop_map(|((from, to), config)| Act::Change(from, to, Box::new(config))),
     ];
-    vec((0..7_u64, act), 1..80)
+    vec((0..7_u64, act), 1..80).boxed()
 }
 
 proptest! {

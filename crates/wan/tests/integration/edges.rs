@@ -13,11 +13,11 @@ use crate::random_links::{Payload, Plan, at, cases, drain, drain_network, jitter
 const HALF: u64 = 1 << 63;
 
 /// Spans at and around the powers of two that end a signed or an unsigned count.
-fn edge() -> impl Strategy<Value = u64> {
-    select(vec![0, 1, HALF - 2, HALF - 1, HALF, HALF + 1, u64::MAX - 1, u64::MAX])
+fn edge() -> BoxedStrategy<u64> {
+    select(vec![0, 1, HALF - 2, HALF - 1, HALF, HALF + 1, u64::MAX - 1, u64::MAX]).boxed()
 }
 
-fn long_delay() -> impl Strategy<Value = Delay> {
+fn long_delay() -> BoxedStrategy<Delay> {
     // Jitter is counted with a sign: a mean up to 2^63 − 1, a deviation up to half of it.
     let mean = || edge().prop_map(|nanos| nanos.min(HALF - 1));
     prop_oneof![
@@ -26,14 +26,16 @@ fn long_delay() -> impl Strategy<Value = Delay> {
         1 => (mean(), edge()).prop_map(|(mean, sd)| jittery(nanos(mean), nanos(sd.min((HALF - 1) / 2)), Distribution::Normal)),
         1 => mean().prop_map(|mean| jittery(nanos(mean), nanos(mean / 2), Distribution::Uniform)),
     ]
+    .boxed()
 }
 
-fn extreme_config() -> impl Strategy<Value = LinkConfig> {
+fn extreme_config() -> BoxedStrategy<LinkConfig> {
     let overhead = select(vec![0, 1, i32::MAX]);
     let bottleneck = (select(vec![1, 8, u64::MAX]), overhead)
         .prop_map(|(bits, overhead)| Bottleneck { framing: Framing { overhead, cells: None }, ..Bottleneck::at_rate(rate(bits)) });
     (long_delay(), proptest::option::of(bottleneck), select(vec![Order::AllowReordering, Order::InOrder]))
         .prop_map(|(delay, bottleneck, order)| LinkConfig { delay, bottleneck, order, ..LinkConfig::default() })
+        .boxed()
 }
 
 proptest! {

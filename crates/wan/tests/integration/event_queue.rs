@@ -54,7 +54,7 @@ enum Step {
 const BUCKET: u64 = 1 << 16;
 const RING: u64 = 4096 * BUCKET;
 
-fn span() -> impl Strategy<Value = u64> {
+fn span() -> BoxedStrategy<u64> {
     prop_oneof![
         2 => Just(0),
         2 => 0..4u64,
@@ -65,9 +65,10 @@ fn span() -> impl Strategy<Value = u64> {
         1 => 0..RING * 100,
         1 => any::<u64>(),
     ]
+    .boxed()
 }
 
-fn steps() -> impl Strategy<Value = Vec<Step>> {
+fn steps() -> BoxedStrategy<Vec<Step>> {
     let edge = prop_oneof![Just(0), Just(u64::MAX), Just(u64::MAX - 1), u64::MAX - RING * 2..u64::MAX];
     let when = prop_oneof![12 => span().prop_map(When::Ahead), 2 => span().prop_map(When::Behind), 1 => edge.prop_map(When::Exactly)];
     let quiet = prop_oneof![6 => 0..BUCKET * 2, 3 => 0..RING * 2, 1 => span()];
@@ -80,6 +81,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
         ],
         1..200,
     )
+    .boxed()
 }
 
 proptest! {

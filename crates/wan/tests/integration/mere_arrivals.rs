@@ -7,9 +7,9 @@ use proptest::prelude::*;
 use crate::random_links::{Plan, cases, plain_config, plan, sendings};
 
 /// Returns a strategy for plans of three nodes whose links decide the arrival of a packet when it is offered.
-fn direct() -> impl Strategy<Value = Plan> {
+fn direct() -> BoxedStrategy<Plan> {
     let nowhere = || vec![None; 3];
-    proptest::collection::vec(plain_config(), 9).prop_map(move |links| Plan { nodes: 3, links, uplinks: nowhere(), downlinks: nowhere() })
+    proptest::collection::vec(plain_config(), 9).prop_map(move |links| Plan { nodes: 3, links, uplinks: nowhere(), downlinks: nowhere() }).boxed()
 }
 
 proptest! {

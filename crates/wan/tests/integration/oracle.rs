@@ -66,7 +66,7 @@ fn moderate(script: &[Operation]) -> Vec<Operation> {
 }
 
 /// Operations whose changes never take a bottleneck away or add one: what waits then is another test's matter.
-fn changes(bottlenecks: bool) -> impl Strategy<Value = (LinkConfig, Vec<Operation>)> {
+fn changes(bottlenecks: bool) -> BoxedStrategy<(LinkConfig, Vec<Operation>)> {
     let config = move || config_with(bottleneck().prop_map(move |bottleneck| bottlenecks.then_some(bottleneck)));
     let operation = prop_oneof![
         6 => (gap(), size()).prop_map(|(gap, size)| Operation::Offer { gap, size }),
@@ -74,7 +74,7 @@ fn changes(bottlenecks: bool) -> impl Strategy<Value = (LinkConfig, Vec<Operatio
         1 => Just(Operation::Poll),
         2 => (gap(), config()).prop_map(|(gap, config)| Operation::Configure { gap, config: Box::new(config) }),
     ];
-    (config(), vec(operation, 1..80))
+    (config(), vec(operation, 1..80)).boxed()
 }
 
 proptest! {

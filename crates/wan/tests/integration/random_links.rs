@@ -2,6 +2,9 @@
 //!
 //! Instants lie mostly on a grid of a microsecond, and at the favourite rate a byte takes just that: so departures, arrivals, offers and the edges
 //! of outages often fall on the same instant.
+//!
+//! Strategies are boxed. An unboxed strategy is a type with the types of all its parts inside, and each property that draws from the strategy would compile
+//! all of these parts again.
 
 use std::time::Duration;
 
@@ -129,48 +132,47 @@ pub(crate) fn at(nanos: u64) -> Instant {
     Instant::from_nanos(nanos)
 }
 
-pub(crate) fn gap() -> impl Strategy<Value = Duration> {
-    prop_oneof![4 => Just(0), 8 => (1..6u64).prop_map(|n| n * 1_000), 2 => 0..10_000u64, 1 => 0..500_000_000u64].prop_map(nanos)
+pub(crate) fn gap() -> BoxedStrategy<Duration> {
+    prop_oneof![4 => Just(0), 8 => (1..6u64).prop_map(|n| n * 1_000), 2 => 0..10_000u64, 1 => 0..500_000_000u64].prop_map(nanos).boxed()
 }
 
 /// Mostly a few bytes.
-pub(crate) fn size() -> impl Strategy<Value = Bytes> {
-    prop_oneof![2 => Just(0), 16 => 1..6u64, 2 => 1..1_500u64].prop_map(Bytes::new)
+pub(crate) fn size() -> BoxedStrategy<Bytes> {
+    prop_oneof![2 => Just(0), 16 => 1..6u64, 2 => 1..1_500u64].prop_map(Bytes::new).boxed()
 }
 
 /// Nothing up to more than the line can send in the age of the universe.
-pub(crate) fn any_size() -> impl Strategy<Value = Bytes> {
-    prop_oneof![20 => size(), 1 => any::<u32>().prop_map(|size| Bytes::new(size.into())), 1 => any::<u64>().prop_map(Bytes::new)]
+pub(crate) fn any_size() -> BoxedStrategy<Bytes> {
+    prop_oneof![20 => size(), 1 => any::<u32>().prop_map(|size| Bytes::new(size.into())), 1 => any::<u64>().prop_map(Bytes::new)].boxed()
 }
 
-pub(crate) fn some_probability() -> impl Strategy<Value = Probability> {
-    prop_oneof![1 => Just(0.0), 1 => Just(1.0), 6 => 0.0..1.0f64].prop_map(probability)
+pub(crate) fn some_probability() -> BoxedStrategy<Probability> {
+    prop_oneof![1 => Just(0.0), 1 => Just(1.0), 6 => 0.0..1.0f64].prop_map(probability).boxed()
 }
 
-pub(crate) fn loss() -> impl Strategy<Value = Loss> {
+pub(crate) fn loss() -> BoxedStrategy<Loss> {
     let chain = [some_probability(), some_probability(), some_probability(), some_probability()];
     prop_oneof![
         2 => Just(Loss::None),
         1 => some_probability().prop_map(Loss::Independent),
         1 => chain.prop_map(|[p, r, h, k]| Loss::GilbertElliott(GilbertElliott { p, r, h, k })),
     ]
+    .boxed()
 }
 
-pub(crate) fn bottleneck() -> impl Strategy<Value = Bottleneck> {
+pub(crate) fn bottleneck() -> BoxedStrategy<Bottleneck> {
     let rates = prop_oneof![4 => select(vec![BYTE_A_MICROSECOND, BYTE_A_MICROSECOND / 2]), 1 => 100_000..100_000_000u64];
     let limits = prop_oneof![
         1 => Just(None),
         2 => (0..5u64).prop_map(|packets| Some(QueueLimit::Packets(packets))),
         2 => (0..12u64).prop_map(|bytes| Some(QueueLimit::Bytes(Bytes::new(bytes)))),
     ];
-    (rates, select(vec![0, 0, 1, 28]), limits).prop_map(|(bits, overhead, limit)| Bottleneck {
-        framing: Framing { overhead, cells: None },
-        limit,
-        ..Bottleneck::at_rate(rate(bits))
-    })
+    (rates, select(vec![0, 0, 1, 28]), limits)
+        .prop_map(|(bits, overhead, limit)| Bottleneck { framing: Framing { overhead, cells: None }, limit, ..Bottleneck::at_rate(rate(bits)) })
+        .boxed()
 }
 
-pub(crate) fn delay() -> impl Strategy<Value = Delay> {
+pub(crate) fn delay() -> BoxedStrategy<Delay> {
     prop_oneof![
         1 => Just(Delay::default()),
         2 => (0..20u64).prop_map(|micros| Delay::constant(Duration::from_micros(micros))),
@@ -179,70 +181,65 @@ pub(crate) fn delay() -> impl Strategy<Value = Delay> {
         // √3 < 1.8, so the law stays above zero.
         1 => (0..30_000u64).prop_map(|mean| jittery(nanos(mean), nanos(mean * 10 / 18), Distribution::Uniform)),
     ]
+    .boxed()
 }
 
-pub(crate) fn outages() -> impl Strategy<Value = Outages> {
-    vec((0..40u64, 1..20u64), 0..3).prop_map(|spans| {
-        let mut edge = 0;
-        let mut next = |micros| {
-            edge += micros * 1_000;
-            at(edge)
-        };
-        Outages::new(spans.into_iter().map(|(up, down)| Outage { from: next(up), to: next(down) }).collect()).unwrap()
-    })
+pub(crate) fn outages() -> BoxedStrategy<Outages> {
+    vec((0..40u64, 1..20u64), 0..3)
+        .prop_map(|spans| {
+            let mut edge = 0;
+            let mut next = |micros| {
+                edge += micros * 1_000;
+                at(edge)
+            };
+            Outages::new(spans.into_iter().map(|(up, down)| Outage { from: next(up), to: next(down) }).collect()).unwrap()
+        })
+        .boxed()
 }
 
-pub(crate) fn config() -> impl Strategy<Value = LinkConfig> {
+pub(crate) fn config() -> BoxedStrategy<LinkConfig> {
     config_with(proptest::option::of(bottleneck()))
 }
 
-pub(crate) fn config_with(bottleneck: impl Strategy<Value = Option<Bottleneck>>) -> impl Strategy<Value = LinkConfig> {
+pub(crate) fn config_with(bottleneck: impl Strategy<Value = Option<Bottleneck>> + 'static) -> BoxedStrategy<LinkConfig> {
     let order = select(vec![Order::AllowReordering, Order::InOrder]);
     let some_outages = prop_oneof![2 => Just(Outages::default()), 1 => outages()];
-    (some_outages, loss(), bottleneck, delay(), order).prop_map(|(outages, loss, bottleneck, delay, order)| LinkConfig {
-        outages,
-        loss,
-        bottleneck,
-        delay,
-        order,
-        ..LinkConfig::default()
-    })
+    (some_outages, loss(), bottleneck, delay(), order)
+        .prop_map(|(outages, loss, bottleneck, delay, order)| LinkConfig { outages, loss, bottleneck, delay, order, ..LinkConfig::default() })
+        .boxed()
 }
 
 /// Returns a strategy for links that only delay, by a constant. The network computes such links by an addition.
-pub(crate) fn plain_config() -> impl Strategy<Value = LinkConfig> {
-    (0..20u64).prop_map(|micros| LinkConfig { delay: Delay::constant(Duration::from_micros(micros)), ..LinkConfig::default() })
+pub(crate) fn plain_config() -> BoxedStrategy<LinkConfig> {
+    (0..20u64).prop_map(|micros| LinkConfig { delay: Delay::constant(Duration::from_micros(micros)), ..LinkConfig::default() }).boxed()
 }
 
-pub(crate) fn any_config() -> impl Strategy<Value = LinkConfig> {
-    prop_oneof![3 => config(), 1 => plain_config()]
+pub(crate) fn any_config() -> BoxedStrategy<LinkConfig> {
+    prop_oneof![3 => config(), 1 => plain_config()].boxed()
 }
 
-pub(crate) fn offers() -> impl Strategy<Value = Vec<(Duration, Bytes)>> {
-    vec((gap(), size()), 1..80)
+pub(crate) fn offers() -> BoxedStrategy<Vec<(Duration, Bytes)>> {
+    vec((gap(), size()), 1..80).boxed()
 }
 
-pub(crate) fn operations() -> impl Strategy<Value = Vec<Operation>> {
+pub(crate) fn operations() -> BoxedStrategy<Vec<Operation>> {
     let operation = prop_oneof![
         8 => (gap(), any_size()).prop_map(|(gap, size)| Operation::Offer { gap, size }),
         2 => gap().prop_map(|gap| Operation::Pass { gap }),
         2 => Just(Operation::Poll),
         1 => (gap(), any_config()).prop_map(|(gap, config)| Operation::Configure { gap, config: Box::new(config) }),
     ];
-    vec(operation, 1..80)
+    vec(operation, 1..80).boxed()
 }
 
-pub(crate) fn plan(nodes: usize, access: f64) -> impl Strategy<Value = Plan> {
+pub(crate) fn plan(nodes: usize, access: f64) -> BoxedStrategy<Plan> {
     let line = move || proptest::option::weighted(access, any_config());
-    (vec(any_config(), nodes * nodes), vec(line(), nodes), vec(line(), nodes)).prop_map(move |(links, uplinks, downlinks)| Plan {
-        nodes,
-        links,
-        uplinks,
-        downlinks,
-    })
+    (vec(any_config(), nodes * nodes), vec(line(), nodes), vec(line(), nodes))
+        .prop_map(move |(links, uplinks, downlinks)| Plan { nodes, links, uplinks, downlinks })
+        .boxed()
 }
 
-pub(crate) fn sendings(nodes: u16) -> impl Strategy<Value = Vec<Sending>> {
+pub(crate) fn sendings(nodes: u16) -> BoxedStrategy<Vec<Sending>> {
     let sending = (gap(), 0..nodes, 1..nodes, size(), any::<bool>()).prop_map(move |(gap, from, ahead, size, poll)| Sending {
         gap,
         from: NodeId(from),
@@ -250,5 +247,5 @@ pub(crate) fn sendings(nodes: u16) -> impl Strategy<Value = Vec<Sending>> {
         size,
         poll,
     });
-    vec(sending, 1..120)
+    vec(sending, 1..120).boxed()
 }

@@ -1,4 +1,4 @@
-//! Printing and reading are inverse, and reading never panics.
+//! Printing and reading are inverse, and reading never panics. Strategies are boxed, so that their parts are compiled once and not in each property.
 
 use core::num::{NonZeroU32, NonZeroU64};
 use core::time::Duration;
@@ -11,54 +11,54 @@ use crate::netem::{
     ReorderSpec, SlotGap, SlotSpec, StateSpec,
 };
 
-fn percent() -> impl Strategy<Value = Percent> {
+fn percent() -> BoxedStrategy<Percent> {
     let round = (0..=1000_u32).prop_map(|tenths| f64::from(tenths) / 10.0);
-    prop_oneof![round, 0.0..=100.0, 0.0..=1e-12].prop_map(|value| Percent::new(value).unwrap())
+    prop_oneof![round, 0.0..=100.0, 0.0..=1e-12].prop_map(|value| Percent::new(value).unwrap()).boxed()
 }
 
-fn chance() -> impl Strategy<Value = ChanceSpec> {
-    (percent(), of(percent())).prop_map(|(percent, correlation)| ChanceSpec { percent, correlation })
+fn chance() -> BoxedStrategy<ChanceSpec> {
+    (percent(), of(percent())).prop_map(|(percent, correlation)| ChanceSpec { percent, correlation }).boxed()
 }
 
 /// Times above zero, in which every number of binary digits is equally likely.
-fn time() -> impl Strategy<Value = Duration> {
-    (1..=63_u32, any::<u64>()).prop_map(|(bits, word)| Duration::from_nanos((word >> (64 - bits)).max(1)))
+fn time() -> BoxedStrategy<Duration> {
+    (1..=63_u32, any::<u64>()).prop_map(|(bits, word)| Duration::from_nanos((word >> (64 - bits)).max(1))).boxed()
 }
 
-fn distribution() -> impl Strategy<Value = Distribution> {
+fn distribution() -> BoxedStrategy<Distribution> {
     let name = prop_oneof![Just("uniform"), Just("normal"), Just("pareto"), Just("paretonormal")].prop_map(str::to_owned);
-    prop_oneof![name, "[!-~]{1,12}"].prop_map(|name| Distribution::named(&name).unwrap())
+    prop_oneof![name, "[!-~]{1,12}"].prop_map(|name| Distribution::named(&name).unwrap()).boxed()
 }
 
-fn delay() -> impl Strategy<Value = DelaySpec> {
+fn delay() -> BoxedStrategy<DelaySpec> {
     let jitter = (time(), of(percent()), of(distribution()));
     let jitter = jitter.prop_map(|(time, correlation, distribution)| JitterSpec { time, correlation, distribution });
-    (time(), of(jitter)).prop_map(|(time, jitter)| DelaySpec { time, jitter })
+    (time(), of(jitter)).prop_map(|(time, jitter)| DelaySpec { time, jitter }).boxed()
 }
 
 /// Percentages of which only the first ones are given, as the grammar demands.
-fn said<const N: usize>() -> impl Strategy<Value = [Option<Percent>; N]> {
-    (prop::collection::vec(percent(), N), 0..=N).prop_map(|(all, count)| core::array::from_fn(|index| (index < count).then_some(all[index])))
+fn said<const N: usize>() -> BoxedStrategy<[Option<Percent>; N]> {
+    (prop::collection::vec(percent(), N), 0..=N).prop_map(|(all, count)| core::array::from_fn(|index| (index < count).then_some(all[index]))).boxed()
 }
 
-fn loss() -> impl Strategy<Value = LossSpec> {
+fn loss() -> BoxedStrategy<LossSpec> {
     let half = |percent: Percent| Percent::new(percent.get() / 2.0).unwrap();
     let state = (percent(), said::<4>()).prop_map(move |(p13, [p31, p32, p23, p14])| {
         LossSpec::State(StateSpec { p13: half(p13), p31: p31.map(half), p32: p32.map(half), p23, p14: p14.map(half) })
     });
     let gemodel =
         (percent(), said::<3>()).prop_map(|(p, [r, loss_in_bad, loss_in_good])| LossSpec::Gemodel(GemodelSpec { p, r, loss_in_bad, loss_in_good }));
-    prop_oneof![chance().prop_map(LossSpec::Random), state, gemodel]
+    prop_oneof![chance().prop_map(LossSpec::Random), state, gemodel].boxed()
 }
 
-fn rate() -> impl Strategy<Value = RateSpec> {
+fn rate() -> BoxedStrategy<RateSpec> {
     let bytes = (1..=64_u32, any::<u64>()).prop_map(|(bits, word)| NonZeroU64::new((word >> (64 - bits)).max(1)).unwrap());
     let cell = (1..=u32::MAX, of(any::<i32>())).prop_map(|(size, overhead)| CellSpec { size: NonZeroU32::new(size).unwrap(), overhead });
     let framing = (any::<i32>(), of(cell)).prop_map(|(overhead, cell)| FramingSpec { overhead, cell });
-    (bytes, of(framing)).prop_map(|(bytes_per_sec, framing)| RateSpec { bytes_per_sec, framing })
+    (bytes, of(framing)).prop_map(|(bytes_per_sec, framing)| RateSpec { bytes_per_sec, framing }).boxed()
 }
 
-fn cross() -> impl Strategy<Value = CrossSpec> {
+fn cross() -> BoxedStrategy<CrossSpec> {
     let rate = || (1..=40_u32, any::<u64>()).prop_map(|(bits, word)| NonZeroU64::new((word >> (64 - bits)).max(1)).unwrap());
     let sources = (1..=65_536_u32).prop_map(|sources| NonZeroU32::new(sources).unwrap());
     let on_off = (sources, rate(), time(), time(), of(1.000_1..1.999_9)).prop_map(|(sources, peak, on, off, shape)| CrossSource::OnOff {
@@ -69,20 +69,20 @@ fn cross() -> impl Strategy<Value = CrossSpec> {
         shape,
     });
     let source = prop_oneof![rate().prop_map(|bytes_per_sec| CrossSource::Poisson { bytes_per_sec }), on_off];
-    (source, of((1..=u32::MAX).prop_map(|size| NonZeroU32::new(size).unwrap()))).prop_map(|(source, size)| CrossSpec { source, size })
+    (source, of((1..=u32::MAX).prop_map(|size| NonZeroU32::new(size).unwrap()))).prop_map(|(source, size)| CrossSpec { source, size }).boxed()
 }
 
-fn slot() -> impl Strategy<Value = SlotSpec> {
+fn slot() -> BoxedStrategy<SlotSpec> {
     let range = (time(), of(time())).prop_map(|(a, b)| match b {
         None => SlotGap::Range { min: a, max: None },
         Some(b) => SlotGap::Range { min: a.min(b), max: Some(a.max(b)) },
     });
     let drawn = (distribution(), time(), time()).prop_map(|(distribution, delay, jitter)| SlotGap::Drawn { distribution, delay, jitter });
     let count = || of((1..=i32::MAX).prop_map(|count| NonZeroU32::new(count.unsigned_abs()).unwrap()));
-    (prop_oneof![range, drawn], count(), count()).prop_map(|(gap, packets, bytes)| SlotSpec { gap, packets, bytes })
+    (prop_oneof![range, drawn], count(), count()).prop_map(|(gap, packets, bytes)| SlotSpec { gap, packets, bytes }).boxed()
 }
 
-pub(in crate::netem) fn netem() -> impl Strategy<Value = Netem> {
+pub(in crate::netem) fn netem() -> BoxedStrategy<Netem> {
     let reorder = (chance(), of((1..=u32::MAX).prop_map(|gap| NonZeroU32::new(gap).unwrap()))).prop_map(|(chance, gap)| ReorderSpec { chance, gap });
     let head = (of(any::<u32>()), of(delay()), of(loss()), any::<bool>());
     let tail = (of(chance()), of(chance()), of(reorder), of(rate()), of(cross()), of(slot()), of(any::<u64>()));
@@ -111,10 +111,11 @@ pub(in crate::netem) fn netem() -> impl Strategy<Value = Netem> {
             }
             netem
         })
+        .boxed()
 }
 
 /// Words of the grammar, in a random order that is mostly wrong.
-fn salad() -> impl Strategy<Value = String> {
+fn salad() -> BoxedStrategy<String> {
     let word = prop_oneof![
         prop::sample::select(vec![
             "limit",
@@ -160,7 +161,7 @@ fn salad() -> impl Strategy<Value = String> {
         "\\PC{0,8}",
         "[0-9.eE+-]{1,8}[a-zA-Z%]{0,3}",
     ];
-    prop::collection::vec(word, 0..12).prop_map(|words| words.join(" "))
+    prop::collection::vec(word, 0..12).prop_map(|words| words.join(" ")).boxed()
 }
 
 proptest! {
