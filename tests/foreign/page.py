@@ -7,7 +7,7 @@ from suites import LOOPBACKS, SUITES
 LINKS = " | ".join(f"`{words}`" for words in LOOPBACKS)
 PASSING = f"| crate | tests | over the network | real loopback | {LINKS} | lines changed |\n| --- | ---: | ---: | ---: |{' ---: |' * len(LOOPBACKS)} ---: |"
 TIMES = f"| crate | real loopback | {LINKS} |\n| --- | ---: |{' ---: |' * len(LOOPBACKS)}"
-UNDER_LOAD = "| crate | runs each | real loopback | test bed |\n| --- | ---: | ---: | ---: |"
+UNDER_LOAD = "| crate | runs each | at once | real loopback | test bed |\n| --- | ---: | ---: | ---: | ---: |"
 FAILURES = "| crate | test | loopback | seeds that fail | smallest loopback, with the seed |\n| --- | --- | --- | ---: | --- |"
 LIMITS = "| crate | test | why |\n| --- | --- | --- |"
 
@@ -19,7 +19,7 @@ def tables(suite, figures):
     return {
         PASSING: [row(f"{name} {suite.version} ({suite.licence})", tests, figures["networked"], *passing, figures["changed"])],
         TIMES: [row(name, *(f"{taken:.2f}" for taken in figures["seconds"]))],
-        UNDER_LOAD: [row(name, figures["loads"], figures["real under load"], figures["bed under load"])] if figures["loads"] else [],
+        UNDER_LOAD: [row(name, figures["loads"], figures["at once"], figures["real under load"], figures["bed under load"])] if figures["loads"] else [],
         FAILURES: [
             row(name, f"`{test}`", f"`{words}`", f"{len(seeds)} of {figures['seeds']}", f"`{smallest}`, seed {seeds[0]}")
             for test, words, seeds, smallest in figures["failures"]

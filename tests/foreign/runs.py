@@ -4,10 +4,14 @@ import contextlib
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from itertools import combinations
+from pathlib import Path
 
 from suites import CUT, IDEAL, LOOPBACKS
 
@@ -15,6 +19,8 @@ from suites import CUT, IDEAL, LOOPBACKS
 BURNERS = 4
 # Longest time of a program of tests [s].
 PATIENCE = 300
+# Runs a program where no other program has a port: in a network namespace whose only interface is the loopback.
+ALONE = ["unshare", "--map-root-user", "--net", "sh", "-c", 'ip link set lo up && exec "$@"', "sh"]
 
 
 def called(command, folder, patience=None, **variables):
@@ -23,6 +29,22 @@ def called(command, folder, patience=None, **variables):
     with contextlib.suppress(subprocess.TimeoutExpired):
         return subprocess.run(command, cwd=folder, env={**os.environ, **variables}, timeout=patience, check=False, **streams)
     return subprocess.CompletedProcess(command, None, "", "")
+
+
+def kill_children():
+    for children in Path("/proc/self/task").glob("*/children"):
+        for child in children.read_text().split():
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(int(child), signal.SIGKILL)
+
+
+@cache
+def alone():
+    """Returns whether this system allows network namespaces."""
+    try:
+        return called([*ALONE, "true"], ".").returncode == 0
+    except FileNotFoundError:
+        return False
 
 
 class Runs:
@@ -45,26 +67,43 @@ class Runs:
         partial.rename(self.file)
         return value
 
-    def run(self, key, build, **variables):
-        """Returns the failed tests of a run, and its time [s]. A run that was kept is not repeated."""
-        if key in self.kept["runs"]:
-            return self.kept["runs"][key]
+    def results(self, runs, at_once=1):
+        """Returns the failed tests of each run, and its time [s]. Makes the runs that are not kept, `at_once` at the same time."""
+        missing = [run for run in runs if run[0] not in self.kept["runs"]]
+        with ThreadPoolExecutor(at_once) as pool:
+            try:
+                for (key, *_), result in zip(missing, pool.map(self.made, missing)):
+                    self.keep("runs", key, result)
+            except BaseException:
+                # The threads would else wait for the programs that run, and start others. No run that ends now is kept.
+                pool.shutdown(wait=False, cancel_futures=True)
+                kill_children()
+                raise
+        return [self.kept["runs"][key] for key, *_ in runs]
+
+    def made(self, run):
+        """Makes a run. Returns the failed tests, and its time [s]."""
+        key, build, before, variables = run
         wrong, begin = [], time.monotonic()
         for target, tests in self.tests.items():
             # Programs of tests that log would print between the names of tests and their results.
-            done = called([self.programs[build][target]], self.folder, PATIENCE, RUST_LOG="off", **variables)
+            done = called([*before, self.programs[build][target]], self.folder, PATIENCE, RUST_LOG="off", **variables)
             names = sorted(failed(done, tests))
             wrong += [f"{target} {test}" for test in names]
             if names:
                 with self.log.open("a") as log:
                     log.write(f"##### {key}: {target}\n{done.stdout}{done.stderr}\n")
-        return self.keep("runs", key, [wrong, time.monotonic() - begin])
+        return [wrong, time.monotonic() - begin]
 
     def real(self, number, prefix=""):
-        return self.run(f"{prefix}real {number}", "real")
+        return f"{prefix}real {number}", "real", ALONE if self.at_once() > 1 else [], {}
 
     def bed(self, words, seed, prefix=""):
-        return self.run(f"{prefix}{words} seed {seed}", "bed", **self.variables(words, seed))
+        return f"{prefix}{words} seed {seed}", "bed", [], self.variables(words, seed)
+
+    def at_once(self):
+        """Returns how many runs under load go at once. On the real loopback each of them needs a network of its own."""
+        return self.suite.at_once if alone() else 1
 
     def variables(self, words, seed):
         asked = {"COHAPTIC_TEST_LOOPBACK": words, "COHAPTIC_TEST_SEED": str(seed), "COHAPTIC_TEST_STD": "clocks random"}
@@ -95,33 +134,36 @@ class Runs:
 
     def figures(self, seeds, loads):
         """Makes all runs that are not kept, and returns what the page shows."""
-        seeds, loads = min(seeds, self.suite.seeds), min(loads, self.suite.loads)
-        real = [self.real(number) for number in range(self.suite.reals)]
-        beds = {words: [self.bed(words, seed) for seed in range(seeds)] for words in LOOPBACKS}
+        seeds = min(seeds, self.suite.seeds)
+        real = self.results([self.real(number) for number in range(self.suite.reals)])
+        beds = {words: self.results([self.bed(words, seed) for seed in range(seeds)]) for words in LOOPBACKS}
         # Loopbacks take turns, and then seeds.
         turns = [(LOOPBACKS[number % len(LOOPBACKS)], number // len(LOOPBACKS) % seeds) for number in range(loads)]
         with load():
-            real_under = [self.real(number, "load: ")[0] for number in range(loads)]
-            bed_under = [self.bed(*turn, f"load {number}: ")[0] for number, turn in enumerate(turns)]
+            real_under = self.results([self.real(number, "load: ") for number in range(loads)], self.at_once())
+            bed_under = self.results([self.bed(*turn, f"load {number}: ") for number, turn in enumerate(turns)], self.at_once())
         failures = {}
         for words, runs in beds.items():
             for seed, (wrong, _) in enumerate(runs):
                 for test in wrong:
                     failures.setdefault((test, words), []).append(seed)
+        # A test that fails in some of the runs without load counts in each run under load in which the test fails.
+        always = set.intersection(*(set(wrong) for wrong, _ in real))
         limits = {test for test, words in failures if words == IDEAL}
         own = sorted(item for item in failures.items() if item[0][0] not in limits)
         return {
             "tests": sum(map(len, self.tests.values())),
-            "networked": len(set(self.bed(CUT, 0)[0]) - limits),
+            "networked": len(set(self.results([self.bed(CUT, 0)])[0][0]) - limits),
             "seeds": seeds,
             "failed": [len({test for wrong, _ in real for test in wrong}), *(len({test for test, where in failures if where == words}) for words in LOOPBACKS)],
             "seconds": [sum(taken for _, taken in runs) / len(runs) for runs in [real, *beds.values()]],
             "limits": limits,
             "failures": [(test, words, found, self.smallest(test, words, found[0])) for (test, words), found in own],
             "loads": loads,
-            # Runs in which other tests fail than without load.
-            "real under load": sum(wrong != real[0][0] for wrong in real_under),
-            "bed under load": sum(wrong != self.bed(*turn)[0] for wrong, turn in zip(bed_under, turns)),
+            "at once": self.at_once(),
+            # Runs in which other tests fail than in each run without load.
+            "real under load": sum(set(wrong) != always for wrong, _ in real_under),
+            "bed under load": sum(wrong != beds[words][seed][0] for (wrong, _), (words, seed) in zip(bed_under, turns)),
         }
 
 

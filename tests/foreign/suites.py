@@ -21,10 +21,11 @@ class Suite:
     variables: dict[str, str] = field(default_factory=dict)
     # Programs of tests that are left out.
     skipped: tuple[str, ...] = ()
-    # Runs on the real loopback, seeds, and runs under load at most: slow suites have fewer.
+    # Runs on the real loopback, and seeds at most: slow suites have fewer.
     reals: int = 3
     seeds: int = 20
-    loads: int = 100
+    # Runs under load that go at the same time. More than one only for suites that mostly sleep, so that the runs hardly disturb each other.
+    at_once: int = 1
     # Tests that fail on an ideal loopback, and why.
     limits: dict[str, str] = field(default_factory=dict)
 
@@ -35,9 +36,9 @@ OF_QUINN = ["echo_dualstack", "echo_v4", "echo_v6", "export_keying_material", "h
 SUITES = [
     Suite("mini-redis", "0.4.1", "MIT"),
     # A lock keeps the tests apart. A test bed cannot wait for another thread, so that its tests run one after the other on one thread.
-    Suite("bore-cli", "0.6.0", "MIT", variables={"RUST_TEST_THREADS": "1"}, loads=20),
+    Suite("bore-cli", "0.6.0", "MIT", variables={"RUST_TEST_THREADS": "1"}, at_once=10),
     # The program left out measures a hundred nodes in memory, for minutes and without a socket.
-    Suite("chitchat", "0.10.1", "MIT", variables={"COHAPTIC_TEST_LIMIT": "30h"}, skipped=("test perf_test",), reals=1, seeds=3, loads=0),
+    Suite("chitchat", "0.10.1", "MIT", variables={"COHAPTIC_TEST_LIMIT": "30h"}, skipped=("test perf_test",), reals=1, seeds=3, at_once=10),
     # The macro of the tests is a private feature, which the archive of axum takes from a path.
     Suite(
         "axum",
@@ -45,7 +46,6 @@ SUITES = [
         "MIT",
         features=["http2", "macros", "multipart", "ws"],
         beside=['axum-macros = { version = "0.5", features = ["__private"] }'],
-        loads=40,
     ),
-    Suite("quinn", "0.11.12", "MIT OR Apache-2.0", loads=40, limits={f"lib quinn tests::{test}": BEFORE for test in OF_QUINN}),
+    Suite("quinn", "0.11.12", "MIT OR Apache-2.0", limits={f"lib quinn tests::{test}": BEFORE for test in OF_QUINN}),
 ]
