@@ -45,6 +45,8 @@ pub struct Analysed {
 pub struct Analysis {
     /// Number of units: complete sessions.
     pub units: usize,
+    /// Trials that timed out, among all analysed trials, indexed by condition.
+    pub timed_out: Vec<Option<Share>>,
     /// Figures of the measures, in the order of the file.
     pub measures: Vec<Analysed>,
     /// Figures of the questions about the conditions, in the order of the file: the mean of a group, and of the Task Load Index the mean of its scales.
@@ -58,7 +60,11 @@ impl Analysis {
     /// Analyses some trials of `units` units.
     pub(crate) fn of(study: &Study, units: usize, observations: &[Observation]) -> Self {
         let measures = study.measures.iter().enumerate().map(|(place, name)| measure(study, units, observations, place, name));
-        Self { units, measures: measures.collect(), questions: Vec::new() }
+        let timed_out = (0..study.conditions.len()).map(|condition| {
+            let of_it = || observations.iter().filter(|observation| observation.condition == condition);
+            Share::of(of_it().filter(|observation| observation.timed_out).count() as u64, of_it().count() as u64)
+        });
+        Self { units, timed_out: timed_out.collect(), measures: measures.collect(), questions: Vec::new() }
     }
 }
 

@@ -17,6 +17,7 @@ pub(super) fn dry_run(study: &Study, analysis: &Analysis, power: &Power, files: 
             found_after_holm: share(difference.corrected),
         }
     });
+    let timed_out = power.timed_out.iter().map(|of| of.map(share));
     document! {
         title: study.title.as_str(),
         people: study.participants(),
@@ -25,6 +26,7 @@ pub(super) fn dry_run(study: &Study, analysis: &Analysis, power: &Power, files: 
         figures: figures(study, analysis),
         times: power.times,
         power: found.collect::<Vec<_>>(),
+        timed_out: timed_out.collect::<Vec<_>>(),
         files: files.to_vec(),
     }
 }

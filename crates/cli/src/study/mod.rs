@@ -7,7 +7,7 @@ mod serve;
 use std::path::Path;
 use std::process::ExitCode;
 
-use cohaptic_study::{Analysis, Power, Study, StudyError, StudyFolder, Verified, Watch, power_lines};
+use cohaptic_study::{Analysis, Power, Study, StudyError, StudyFolder, Verified, Watch, power_lines, timed_out_lines};
 use cohaptic_units::print::Counted;
 
 use crate::arguments::{StudyArguments, StudyCommand, StudyFolderArguments, StudyForgetArguments, StudyRunArguments};
@@ -95,7 +95,13 @@ fn words(study: &Study, analysis: &Analysis, power: &Power) -> String {
     }
     let lines = |lines: Vec<String>| lines.into_iter().map(|line| format!("  {line}\n")).collect::<String>();
     text.push_str(&format!("\nMeans and timeouts of the first dry run:\n{}", lines(analysis.mean_lines(study))));
-    text.push_str(&format!("\nHow often the differences are found, in {}:\n{}", Counted(power.times, "dry run"), lines(power_lines(study, power))));
+    let runs = Counted(power.times, "dry run");
+    text.push_str(&format!("\nHow often the differences are found, in {runs}:\n{}", lines(power_lines(study, power))));
+    let timed_out = timed_out_lines(study, power);
+    // A single run has its timeouts beside its means.
+    if power.times > 1 && !timed_out.is_empty() {
+        text.push_str(&format!("\nHow often trials timed out, in {runs}:\n{}", lines(timed_out)));
+    }
     text
 }
 

@@ -23,7 +23,7 @@ use crate::model::{Person, QuestionKind, Study};
 use crate::sequence::{Answer, Event, Sequence, Step, TrialPlan};
 use crate::trial::Players;
 
-pub use power::{DifferencePower, Power, power_lines};
+pub use power::{DifferencePower, Power, power_lines, timed_out_lines};
 
 /// Standard deviation of the logarithm of T, τ, c and ω over persons.
 const SPREAD: f64 = 0.15;

@@ -37,6 +37,8 @@ pub struct Power {
     pub times: u64,
     /// Differences, in the order of measures, then of conditions.
     pub differences: Vec<DifferencePower>,
+    /// Trials of all runs that timed out, indexed by condition.
+    pub timed_out: Vec<Option<Share>>,
 }
 
 /// Shares of dry runs in which a difference to the first condition is found.
@@ -60,6 +62,8 @@ pub struct DifferencePower {
 struct Run {
     /// Mean difference, p and corrected p, indexed by measure and condition from the second on; `None` for a measure without units.
     differences: Vec<Vec<Option<[f64; 3]>>>,
+    /// Trials that timed out, and all trials, indexed by condition.
+    timed_out: Vec<[u64; 2]>,
 }
 
 impl Run {
@@ -68,13 +72,15 @@ impl Run {
             let figures = |place: usize| measure.differences.get(place).map(|found| [found.estimate.mean, found.p, found.p_holm]);
             (0..study.conditions.len().saturating_sub(1)).map(figures).collect()
         };
-        Self { differences: analysis.measures.iter().map(measure).collect() }
+        let timed_out = analysis.timed_out.iter().map(|share| share.map_or([0, 0], |share| [share.count, share.of]));
+        Self { differences: analysis.measures.iter().map(measure).collect(), timed_out: timed_out.collect() }
     }
 
     /// Returns whether the run has figures of each measure in each condition but the first.
     fn is_of(&self, study: &Study) -> bool {
         let is_whole = |figures: &Vec<Option<[f64; 3]>>| figures.len() + 1 == study.conditions.len();
-        self.differences.len() == study.measures.len() && self.differences.iter().all(is_whole)
+        let has_conditions = self.timed_out.len() == study.conditions.len();
+        has_conditions && self.differences.len() == study.measures.len() && self.differences.iter().all(is_whole)
     }
 }
 
@@ -166,20 +172,41 @@ fn counted(study: &Study, runs: &[Run]) -> Power {
             differences.push(DifferencePower { measure: name.clone(), condition, mean, alone: below(1), corrected: below(2) });
         }
     }
-    Power { times, differences }
+    let timed_out = (0..study.conditions.len()).map(|condition| {
+        let sum = |place: usize| runs.iter().map(|run| run.timed_out[condition][place]).sum();
+        Share::of(sum(0), sum(1))
+    });
+    Power { times, differences, timed_out: timed_out.collect() }
+}
+
+/// Returns a share in percent, with its interval.
+fn percent(share: Share) -> String {
+    let percent = |value: f64| format!("{:.0}", 100.0 * value);
+    format!("{} % ({} to {})", percent(share.value()), percent(share.low), percent(share.high))
+}
+
+/// Returns the trials of all dry runs that timed out as lines of text, a line per condition below the names of the columns. Empty if no trial timed out.
+#[must_use]
+pub fn timed_out_lines(study: &Study, power: &Power) -> Vec<String> {
+    if power.timed_out.iter().flatten().all(|share| share.count == 0) {
+        return Vec::new();
+    }
+    let head = ["condition", "timed out", "share"].map(str::to_owned);
+    let rows = study.conditions.iter().zip(&power.timed_out).map(|(condition, share)| {
+        let [count, of_all] = share.map_or_else(Default::default, |share| [format!("{} of {}", share.count, share.of), percent(share)]);
+        [condition.label.clone(), count, of_all]
+    });
+    let rows: Vec<[String; 3]> = std::iter::once(head).chain(rows).collect();
+    text_table::lines(&rows)
 }
 
 /// Returns the power of a dry run as lines of text, a line per difference below the names of the columns.
 #[must_use]
 pub fn power_lines(study: &Study, power: &Power) -> Vec<String> {
-    let share = |share: Share| {
-        let percent = |value: f64| format!("{:.0}", 100.0 * value);
-        format!("{} % ({} to {})", percent(share.value()), percent(share.low), percent(share.high))
-    };
     let head = ["measure", "condition less the first", "mean difference", "p < 0.05", "after Holm"].map(str::to_owned);
     let rows = power.differences.iter().map(|difference| {
         let condition = study.conditions[difference.condition].label.clone();
-        [difference.measure.clone(), condition, short(difference.mean), share(difference.alone), share(difference.corrected)]
+        [difference.measure.clone(), condition, short(difference.mean), percent(difference.alone), percent(difference.corrected)]
     });
     let rows: Vec<[String; 5]> = std::iter::once(head).chain(rows).collect();
     text_table::lines(&rows)

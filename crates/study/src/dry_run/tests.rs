@@ -142,12 +142,29 @@ fn a_longer_delay_is_found_and_the_kept_runs_are_the_same_again() {
     assert_eq!(kept.power(4, &StopAfter(AtomicUsize::new(0))).unwrap().as_ref(), Some(&power));
     assert_eq!(kept.power(5, &StopAfter(AtomicUsize::new(0))).unwrap(), None);
     assert_eq!(kept.power(5, &NoWatch).unwrap().unwrap().times, 5);
-    fs::write(folder.path().join("dry-runs/00004.json"), "{\"differences\":[[null]]}").unwrap();
+    fs::write(folder.path().join("dry-runs/00004.json"), "{\"differences\":[[null]],\"timed_out\":[]}").unwrap();
     let refused = kept.power(5, &NoWatch).unwrap_err().to_string();
     assert!(refused.contains("00004.json") && refused.contains("other measures"), "{refused}");
     let lines = power_lines(&study, &power);
     assert_eq!(lines.len(), 3);
     assert!(lines[1].starts_with("task_time_s  "), "{lines:?}");
+    // Four runs of six groups with a trial of each condition.
+    assert_eq!(power.timed_out.iter().flatten().map(|share| (share.count, share.of)).collect::<Vec<_>>(), [(0, 24), (0, 24)]);
+    assert!(timed_out_lines(&study, &power).is_empty());
+}
+
+/// Within a second nobody visits three targets. Wilson's interval of six of six begins at 1/(1 + 1.96²/6) = 0.61.
+#[test]
+fn timeouts_are_counted_over_all_dry_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = Study { trials: 1, ..short() };
+    let study = Study { scene_text: study.scene_text.replace("timeout = \"20s\"", "timeout = \"1s\""), limit: Duration::from_secs(1), ..study };
+    let mut kept = StudyFolder::open_dry(study.clone(), folder.path(), "a test").unwrap();
+    assert!(kept.play_dry(&NoWatch).unwrap());
+    let power = kept.power(3, &NoWatch).unwrap().unwrap();
+    let lines = timed_out_lines(&study, &power);
+    assert_eq!(lines.len(), 3, "{lines:?}");
+    assert!(lines[1..].iter().all(|line| line.ends_with("  6 of 6     100 % (61 to 100)")), "{lines:?}");
 }
 
 #[test]

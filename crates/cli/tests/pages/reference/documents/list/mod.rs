@@ -38,6 +38,10 @@ const OTHERS: [Document; 5] = [
                 "power[].found_after_holm.count, power[].found_after_holm.of, power[].found_after_holm.low, power[].found_after_holm.high",
                 "the same after the correction of Holm",
             ),
+            (
+                "timed_out[].count, timed_out[].of, timed_out[].low, timed_out[].high",
+                "trials of each condition that timed out, over all dry runs, with the interval of the share",
+            ),
             ("files", "what was written"),
         ],
     },
