@@ -37,7 +37,7 @@ impl LinkEditor for Editor {
 struct Nobody;
 
 impl Hands for Nobody {
-    fn frame(&self) -> (u64, Arc<str>) {
+    fn frame(&self, _: Option<usize>) -> (u64, Arc<str>) {
         (0, "".into())
     }
 

@@ -26,8 +26,9 @@ pub struct StageFile {
 
 /// Hands that pages move over WebSockets. The methods are called on threads of the server, possibly several at once, and must not wait for the real-time side.
 pub trait Hands: Send + Sync {
-    /// Returns the newest picture of the motion as JSON text, and the picture's number. Numbers grow from picture to picture.
-    fn frame(&self) -> (u64, Arc<str>);
+    /// Returns the newest picture of the motion as JSON text, and the picture's number. Numbers grow from picture to picture. `hand`: hand of the page;
+    /// `None` for a page that only watches.
+    fn frame(&self, hand: Option<usize>) -> (u64, Arc<str>);
 
     /// Takes the free hand `wanted`, or any free hand for `None`. Returns the number of the hand.
     ///

@@ -165,7 +165,7 @@ impl LinkEditor for NoKeys {
 struct Onlookers;
 
 impl Hands for Onlookers {
-    fn frame(&self) -> (u64, Arc<str>) {
+    fn frame(&self, _: Option<usize>) -> (u64, Arc<str>) {
         (0, Arc::from("{}"))
     }
 

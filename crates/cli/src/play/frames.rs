@@ -1,5 +1,6 @@
 //! Passes the motion of a part from the session's real-time thread to the pages, as JSON text.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -18,17 +19,20 @@ struct Newest {
     /// Number of the present part, counted from 1.
     part: usize,
     axes: usize,
+    /// Only peer that the page of a hand is told of, indexed by hand. The page of a hand without an entry is told of all peers.
+    own: Vec<usize>,
     motion: Option<Arc<Motion>>,
-    /// Last written text, with the number of the motion. Several pages share the text.
-    text: Option<(u64, Arc<str>)>,
+    /// Last written texts with the numbers of their motions, indexed by the only peer in the text. Several pages share a text of all peers, `None`.
+    texts: BTreeMap<Option<usize>, (u64, Arc<str>)>,
 }
 
 impl Frames {
-    /// Begins a part whose scene has `axes` axes. The motion of the part before is dropped.
-    pub(crate) fn begin(&self, part: usize, axes: usize) {
+    /// Begins a part whose scene has `axes` axes. The motion of the part before is dropped. `own`: the only peer that the page of a hand is told of, indexed by
+    /// hand; the page of a hand without an entry is told of all peers.
+    pub(crate) fn begin(&self, part: usize, axes: usize, own: Vec<usize>) {
         let mut newest = self.newest();
         // A page must not show the motion of the part before as the motion of this part.
-        (newest.part, newest.axes, newest.motion) = (part, axes, None);
+        (newest.part, newest.axes, newest.own, newest.motion) = (part, axes, own, None);
     }
 
     /// Stores a motion as the newest. Readers hold the lock only while they clone a reference, so that the real-time thread does not wait long.
@@ -43,26 +47,28 @@ impl Frames {
         self.newest().motion.clone()
     }
 
-    /// Returns the number and the JSON text of the newest motion. The text is `{}` before the first motion.
+    /// Returns the number and the JSON text of the newest motion, for the page of `hand`, or for a page that only watches. The text is `{}` before the first
+    /// motion.
     ///
     /// Between [`begin`](Self::begin) and the first motion of the part, an already written text of the part before is returned again.
-    pub(crate) fn text(&self) -> (u64, Arc<str>) {
-        let (number, part, axes, motion) = {
+    pub(crate) fn text(&self, hand: Option<usize>) -> (u64, Arc<str>) {
+        let (number, part, axes, only, motion) = {
             let newest = self.newest();
+            let only = hand.and_then(|hand| newest.own.get(hand).copied());
             // Several pages ask for the same motion, and the text is written once.
-            if let Some((number, text)) = &newest.text
+            if let Some((number, text)) = newest.texts.get(&only)
                 && *number == newest.number
             {
                 return (*number, Arc::clone(text));
             }
-            (newest.number, newest.part, newest.axes, newest.motion.clone())
+            (newest.number, newest.part, newest.axes, only, newest.motion.clone())
         };
         // The lock is not held while the text is written, so that `publish` does not wait for the formatting.
-        let text: Arc<str> = motion.map_or_else(|| "{}".to_owned(), |motion| written(part, axes, &motion)).into();
+        let text: Arc<str> = motion.map_or_else(|| "{}".to_owned(), |motion| written(part, axes, only, &motion)).into();
         let mut newest = self.newest();
         // A text of an older motion is not stored.
         if newest.number == number {
-            newest.text = Some((number, Arc::clone(&text)));
+            newest.texts.insert(only, (number, Arc::clone(&text)));
         }
         (number, text)
     }
@@ -73,12 +79,16 @@ impl Frames {
 }
 
 /// Returns the motion as `{"part":1,"t":0.5,"peers":[…],"packets":[[from,to,ms,lost],…]}`, with `task` for a scene with a task. Positions are in m with six
-/// decimals, forces in N with three.
-fn written(part: usize, axes: usize, motion: &Motion) -> String {
+/// decimals, forces in N with three. With `only`, all other peers are `null`.
+fn written(part: usize, axes: usize, only: Option<usize>, motion: &Motion) -> String {
     let mut text = format!("{{\"part\":{part},\"t\":{:.4},\"peers\":[", motion.elapsed.as_secs_f64());
     for (place, peer) in motion.peers.iter().enumerate() {
         text.push_str(if place == 0 { "" } else { "," });
-        write_peer(&mut text, axes, peer);
+        if only.is_none_or(|only| only == place) {
+            write_peer(&mut text, axes, peer);
+        } else {
+            text.push_str("null");
+        }
     }
     text.push_str("],\"packets\":[");
     for (place, EndedPacket { from, to, after, is_lost }) in motion.packets.iter().enumerate() {
@@ -180,11 +190,14 @@ mod tests {
             packets: vec![packet],
         };
         let frames = Frames::default();
-        assert_eq!(&*frames.text().1, "{}");
-        frames.begin(3, 2);
+        assert_eq!(&*frames.text(None).1, "{}");
+        frames.begin(3, 2, vec![1]);
         frames.publish(motion);
-        let (number, text) = frames.text();
-        let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let value = |hand: Option<usize>| {
+            let (number, text) = frames.text(hand);
+            assert_eq!(number, 1);
+            serde_json::from_str::<serde_json::Value>(&text).unwrap()
+        };
         let expected = serde_json::json!({
             "part": 3, "t": 1.5,
             "peers": [{ "hand": "present", "at": [0.012346, null], "force": [1.0, -0.5], "device": [0.02, null] }],
@@ -194,6 +207,8 @@ mod tests {
                 "reached": 1, "targets": 2, "dwelt": 0.5, "until": 0.0, "left": 2.5, "outcome": "done",
             },
         });
-        assert_eq!((number, value), (1, expected));
+        // A page without an own peer is told of all, and the page of the first hand of no peer but the second.
+        assert_eq!((value(None), value(Some(1))), (expected.clone(), expected));
+        assert_eq!(value(Some(0))["peers"], serde_json::json!([null]));
     }
 }

@@ -111,7 +111,7 @@ impl PlayStage {
 
     /// Makes `part` the running part with the links `links`.
     pub(super) fn begin(&self, part: Part, links: KeyedLinks) -> Arc<Part> {
-        self.frames.begin(part.number, part.scene.axes.count());
+        self.frames.begin(part.number, part.scene.axes.count(), Vec::new());
         let part = Arc::new(part);
         *lock(&self.part) = Some(Arc::clone(&part));
         *lock(&self.links) = Some(links);
@@ -168,8 +168,8 @@ impl PlayStage {
 }
 
 impl Hands for PlayStage {
-    fn frame(&self) -> (u64, Arc<str>) {
-        self.frames.text()
+    fn frame(&self, hand: Option<usize>) -> (u64, Arc<str>) {
+        self.frames.text(hand)
     }
 
     fn take_hand(&self, wanted: Option<usize>) -> Result<usize, String> {

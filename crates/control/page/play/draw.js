@@ -26,6 +26,8 @@ function drawAll(passed, now) {
   const canvas = $('rooms');
   if (document.hidden || frame === null || canvas.clientWidth === 0) return;
   follow(passed);
+  // After a lost connection to a study the picture may come before the number of the own peer.
+  if (!shown[ownPlace()]) return;
   lookAround(passed);
   const { context, width, height } = sized(canvas);
   rooms = facts.alone ? aloneIn(width, height, ownPlace()) : layRooms(width, height, shown.length, ownPlace());

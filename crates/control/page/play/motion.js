@@ -7,7 +7,7 @@ const still = matchMedia('(prefers-reduced-motion: reduce)');
 
 let facts = { part: 0, peers: [], axes: 1, edges: null, host: false };
 let frame = null;
-/** Each peer as it is drawn: its copy, its device, the force, its turn. */
+/** Each peer as it is drawn: its copy, its device, the force, its turn. In a study the server tells of the own peer alone, and all others are null. */
 let shown = [];
 
 /** Three numbers, whatever the scene has. */
@@ -16,7 +16,7 @@ const wide = (values) => [0, 1, 2].map((axis) => (values && Number.isFinite(valu
 function takeFrame(next) {
   const another = frame === null || next.part !== frame.part;
   frame = next;
-  if (shown.length !== next.peers.length) shown = next.peers.map((peer) => ({ at: wide(peer.at), device: wide(peer.device || peer.at), force: wide(peer.force), turned: [1, 0, 0, 0] }));
+  if (shown.length !== next.peers.length) shown = next.peers.map((peer) => peer && { at: wide(peer.at), device: wide(peer.device || peer.at), force: wide(peer.force), turned: [1, 0, 0, 0] });
   takePackets(next.packets);
   return another;
 }
@@ -28,6 +28,7 @@ function follow(passed) {
   const between = (from, to) => from.map((value, axis) => value + (to[axis] - value) * share);
   frame.peers.forEach((peer, i) => {
     const body = shown[i];
+    if (!peer) return;
     body.at = between(body.at, wide(peer.at));
     body.device = between(body.device, wide(peer.device || peer.at));
     body.force = between(body.force, wide(peer.force));

@@ -242,7 +242,7 @@ async fn show(hands: &dyn Hands, taken: &Option<Taken>, pass: &Pass, mut out: im
                 messages.extend(trips.begin(now).map(Message::Ping));
             }
         }
-        let (number, frame) = hands.frame();
+        let (number, frame) = hands.frame(taken.as_ref().map(|taken| taken.hand));
         if number != shown {
             shown = number;
             messages.push(Message::text(frame.to_string()));

@@ -19,7 +19,7 @@ const SOON: Duration = Duration::from_secs(8);
 struct Onlookers;
 
 impl Hands for Onlookers {
-    fn frame(&self) -> (u64, Arc<str>) {
+    fn frame(&self, _: Option<usize>) -> (u64, Arc<str>) {
         (0, Arc::from(""))
     }
 

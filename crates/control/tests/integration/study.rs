@@ -36,7 +36,7 @@ impl Recorder {
 }
 
 impl Hands for Recorder {
-    fn frame(&self) -> (u64, Arc<str>) {
+    fn frame(&self, _: Option<usize>) -> (u64, Arc<str>) {
         (1, r#"{"peers":[]}"#.into())
     }
 

@@ -149,9 +149,9 @@ impl Lab {
     pub(super) fn begin_trial(&self, trial: &TrialScene) {
         let mut state = lock(&self.state);
         let number = state.session.ended().len() + 1;
-        self.frames.begin(number, trial.scene.axes.count());
+        // People are told of their own copy alone: a picture of the others' copies would pass by the emulated network.
+        self.frames.begin(number, trial.scene.axes.count(), trial.hands.clone());
         let mut facts = scene_facts(&trial.scene);
-        // People see their own copy alone: a picture of the others' copies would pass by the emulated network.
         facts.insert("alone".to_owned(), true.into());
         state.people.facts = facts.into();
         state.people.hands.clone_from(&trial.hands);

@@ -17,8 +17,9 @@ use super::{lock, overview};
 const PING: Duration = Duration::from_millis(100);
 
 impl Hands for Lab {
-    fn frame(&self) -> (u64, Arc<str>) {
-        self.frames.text()
+    fn frame(&self, hand: Option<usize>) -> (u64, Arc<str>) {
+        // A second window of a person has no hand, and is told of nobody.
+        hand.map_or_else(|| (0, "{}".into()), |hand| self.frames.text(Some(hand)))
     }
 
     fn take_hand(&self, wanted: Option<usize>) -> Result<usize, String> {

@@ -125,10 +125,11 @@ pub(super) fn take_part(control: Control, mut hides: bool) -> JoinHandle<Vec<Val
                 sleep(Duration::from_millis(50));
                 continue;
             };
-            let mut in_trial = false;
+            let (mut in_trial, mut own) = (false, Value::Null);
             while let Some(said) = page.next() {
                 if said["page"].is_string() {
                     in_trial = said["page"] == "trial";
+                    own = said["facts"]["hand"].clone();
                     let last = said["page"] == "thanks";
                     if let Some(answer) = answer_to(&said) {
                         // A refusal, or a server that is gone: the page is told again.
@@ -140,6 +141,8 @@ pub(super) fn take_part(control: Control, mut hides: bool) -> JoinHandle<Vec<Val
                     }
                 } else if said["peers"].is_array() && in_trial {
                     assert_eq!(said["packets"], json!([]), "packets tell the delay");
+                    let told: Vec<usize> = (0..2).filter(|peer| said["peers"][peer].is_object()).collect();
+                    assert_eq!(json!(told), json!([own]), "a page is told of the own copy alone");
                     if hides {
                         page.say("hidden");
                         page.say("seen");
