@@ -1,5 +1,6 @@
 //! A steady stream of packets over a single link.
 
+use std::iter;
 use std::time::Duration;
 
 use cohaptic_units::Instant;
@@ -36,23 +37,40 @@ impl SteadyStream {
         mut on_record: impl FnMut(&PacketRecord) -> Result<(), E>,
         mut keep_going: impl FnMut(u64, &Link<()>) -> bool,
     ) -> Result<u64, E> {
-        let mut drain = |link: &mut Link<()>| {
-            while let Some(event) = link.poll_event() {
-                on_record(&event.record)?;
+        let mut fault = None;
+        let mut take = |record: &PacketRecord| match on_record(record) {
+            Ok(()) => true,
+            Err(error) => {
+                fault = Some(error);
+                false
             }
-            Ok(())
         };
+        let sent = self.run_over(link, &mut take, &mut keep_going);
+        fault.map_or(Ok(sent), Err)
+    }
+
+    /// The loop of [`SteadyStream::over`], compiled once here. With generic closures, each caller would compile the link again, at the level of the caller's
+    /// crate. The stream ends at the first record for which `on_record` returns `false`.
+    fn run_over(
+        &self,
+        link: &mut Link<()>,
+        on_record: &mut dyn FnMut(&PacketRecord) -> bool,
+        keep_going: &mut dyn FnMut(u64, &Link<()>) -> bool,
+    ) -> u64 {
+        let mut drain = |link: &mut Link<()>| iter::from_fn(|| link.poll_event()).all(|event| on_record(&event.record));
         let mut sent = 0;
         while sent < self.packets && (!sent.is_multiple_of(64) || keep_going(sent, link)) {
             // Cannot fail: the instants grow with the number, and no other code uses the link.
             let _ = link.handle_packet(self.sent(sent), self.info, ());
             sent += 1;
-            drain(link)?;
+            if !drain(link) {
+                return sent;
+            }
         }
         // Lets the packets still inside the link arrive.
         let _ = link.handle_timeout(Instant::MAX);
-        drain(link)?;
-        Ok(sent)
+        drain(link);
+        sent
     }
 }
 

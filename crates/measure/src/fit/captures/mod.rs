@@ -167,9 +167,9 @@ pub fn is_capture(beginning: &[u8]) -> bool {
 /// # Errors
 ///
 /// [`CaptureError`] if a file cannot be read or has no wanted datagrams, or if no datagram of one file is in the other.
-pub fn between(mut sender: impl Read, mut receiver: impl Read, port: Option<u16>) -> Result<Matched, CaptureError> {
-    let sent = Capture::read(End::Sender, &mut sender, port)?;
-    let arrived = Capture::read(End::Receiver, &mut receiver, port)?;
+pub fn between(sender: impl Read, receiver: impl Read, port: Option<u16>) -> Result<Matched, CaptureError> {
+    let sent = Capture::read(End::Sender, sender, port)?;
+    let arrived = Capture::read(End::Receiver, receiver, port)?;
     paired(sent, arrived)
 }
 

@@ -6,8 +6,13 @@ use super::contents::Capture;
 use super::{CaptureError, End, reader, views};
 
 impl Capture {
-    /// Reads a file. With a `port`, only datagrams to this UDP port are used. Not generic, so that the readers are compiled once, in this crate.
-    pub(super) fn read(end: End, from: &mut dyn Read, port: Option<u16>) -> Result<Self, CaptureError> {
+    /// Reads a file. With a `port`, only datagrams to this UDP port are used.
+    pub(super) fn read(end: End, mut from: impl Read, port: Option<u16>) -> Result<Self, CaptureError> {
+        Self::read_any(end, &mut from, port)
+    }
+
+    /// The body of [`Capture::read`], compiled once here, and not for each type of reader.
+    fn read_any(end: End, from: &mut dyn Read, port: Option<u16>) -> Result<Self, CaptureError> {
         let mut capture = Self::empty();
         let ending = reader::for_each_frame(from, |frame| capture.add(&frame, port));
         let frames = capture.contents.frames;
