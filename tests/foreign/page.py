@@ -6,7 +6,7 @@ from suites import LOOPBACKS, SUITES
 
 LINKS = " | ".join(f"`{words}`" for words in LOOPBACKS)
 PASSING = f"| crate | tests | over the network | real loopback | {LINKS} | lines changed |\n| --- | ---: | ---: | ---: |{' ---: |' * len(LOOPBACKS)} ---: |"
-TIMES = f"| crate | real loopback | {LINKS} |\n| --- | ---: |{' ---: |' * len(LOOPBACKS)}"
+TIMES = f"| crate | real loopback | {LINKS} | times as fast |\n| --- | ---: |{' ---: |' * len(LOOPBACKS)} ---: |"
 UNDER_LOAD = "| crate | runs each | at once | real loopback | test bed |\n| --- | ---: | ---: | ---: | ---: |"
 FAILURES = "| crate | test | loopback | seeds that fail | smallest loopback, with the seed |\n| --- | --- | --- | ---: | --- |"
 LIMITS = "| crate | test | why |\n| --- | --- | --- |"
@@ -14,11 +14,11 @@ LIMITS = "| crate | test | why |\n| --- | --- | --- |"
 
 def tables(suite, figures):
     """Returns the head of each table, and the rows of the suite."""
-    name, tests = suite.name, figures["tests"]
+    name, tests, seconds = suite.name, figures["tests"], figures["seconds"]
     passing = [tests - failed for failed in figures["failed"]]
     return {
         PASSING: [row(f"{name} {suite.version} ({suite.licence})", tests, figures["networked"], *passing, figures["changed"])],
-        TIMES: [row(name, *(f"{taken:.2f}" for taken in figures["seconds"]))],
+        TIMES: [row(name, *(f"{taken:.2f}" for taken in [*seconds, seconds[0] / seconds[1]]))],
         UNDER_LOAD: [row(name, figures["loads"], figures["at once"], figures["real under load"], figures["bed under load"])] if figures["loads"] else [],
         FAILURES: [
             row(name, f"`{test}`", f"`{words}`", f"{len(seeds)} of {figures['seeds']}", f"`{smallest}`, seed {seeds[0]}")
