@@ -17,6 +17,8 @@ use crate::shell::CommandLine;
 
 /// Dropped packets of a link that the report names. The document names more.
 const NAMED: usize = 32;
+/// What to do if no seed has failed.
+const FURTHER: &str = ". To find a failure, lose more, delay more, or try more seeds";
 
 /// Describes the run: its commands, and what passed each link.
 pub(super) fn describe(plan: &Plan, outcome: &Outcome) -> String {
@@ -156,12 +158,11 @@ pub(super) fn trials(arguments: &ExecArguments, plan: &Plan, trials: &Trials) ->
     if let Some(failed) = failed_seeds(&trials.seeds) {
         line(&failed);
     }
+    // Without packets the runs say nothing of the network: the command has probably asked a server at localhost.
+    let if_network = |words: &'static str| if trials.packets == 0 { "" } else { words };
     match &trials.verdict {
-        Verdict::Passed => line(&format!(
-            "the command passes with {}. To find a failure, lose more, delay more, or try more seeds",
-            Counted(trials.seeds.len() as u64, "seed")
-        )),
-        Verdict::Elsewhere => line("the command fails over ideal links too, so that the network is not the cause"),
+        Verdict::Passed => line(&format!("the command passes with {}{}", Counted(trials.seeds.len() as u64, "seed"), if_network(FURTHER))),
+        Verdict::Elsewhere => line(&format!("the command fails over ideal links too{}", if_network(", so that the network is not the cause"))),
         Verdict::Repeated(Count { failed: 0, runs }) => line(&format!("the command passes {runs} of {runs} times")),
         Verdict::Repeated(count) => line(&format!("the command {}", times(*count))),
         Verdict::Lost(case, Count { failed: 0, runs }) => line(&format!(
@@ -173,7 +174,8 @@ pub(super) fn trials(arguments: &ExecArguments, plan: &Plan, trials: &Trials) ->
         Verdict::Lost(case, count) => line(&fault(arguments, plan, case, *count)),
     }
     if trials.packets == 0 {
-        line("no packet has passed a link. Packets to localhost stay within a command; a server beside the command has the name host");
+        line("no packet has passed a link. Packets to localhost stay within a command; a server beside the command has the name host, as in");
+        line("  -- env SERVER=http://host:8000 COMMAND");
     }
     if !trials.printed.is_empty() {
         line("the last run that failed printed:");

@@ -67,8 +67,8 @@ fn a_search_says_what_is_not_due_to_lost_packets() {
     let outcome = desk.cohaptic("exec 'delay 1ms loss 1%' --seeds 1..9 --runs 2 --no-priority -- sh -c 'echo spoken; exit 3'");
     assert_eq!(outcome.status, Some(3), "{outcome:?}");
     for part in [
-        "losing nothing: fails 2 of 2 times\nover ideal links: fails 2 of 2 times\nthe command fails over ideal links too",
-        "no packet has passed a link",
+        "losing nothing: fails 2 of 2 times\nover ideal links: fails 2 of 2 times\nthe command fails over ideal links too\nno packet has passed a link",
+        " as in\n  -- env SERVER=http://host:8000 COMMAND\n",
         "  | spoken\n",
     ] {
         assert!(outcome.stdout.contains(part), "{}", outcome.stdout);
@@ -88,6 +88,9 @@ fn a_search_says_what_is_not_due_to_lost_packets() {
     // The steps of the search go to standard error, where `-q` leaves out all but errors.
     assert!(outcome.stderr.contains("losing nothing: passes\n") && outcome.stderr.contains("seed 3: passes"), "{}", outcome.stderr);
     assert_eq!(desk.cohaptic("exec 'delay 1ms loss 1%' --seeds 1..3 --no-priority --json -q -- true").stderr, "");
+    // More losses would find nothing in a command that sends no packet.
+    let outcome = desk.cohaptic("exec 'delay 1ms loss 1%' --seeds 1..3 --no-priority -- true");
+    assert!(outcome.stdout.contains("the command passes with 3 seeds\nno packet has passed a link"), "{}", outcome.stdout);
 
     let mut command =
         desk.command("exec 'delay 1ms' --runs 100 --no-priority -- sh -c 'echo ready >>said; sleep 0.1; [ $(wc -l <said) -lt 3 ] || sleep 1000'");
