@@ -91,6 +91,51 @@ fn the_number_of_movements_follows_fitts() {
     assert!((slope - expected).abs() < 5.0 * (error.hypot(other)) / 20.0, "{slope}, expected {expected}");
 }
 
+/// Width and distance of the sixteen targets of Fitts (1954), in any unit, and the time of his people with the light stylus \[s\].
+const TAPPING: [(f64, f64, f64); 16] = [
+    (2.0, 2.0, 0.180),
+    (1.0, 2.0, 0.212),
+    (0.5, 2.0, 0.281),
+    (0.25, 2.0, 0.392),
+    (2.0, 4.0, 0.203),
+    (1.0, 4.0, 0.260),
+    (0.5, 4.0, 0.372),
+    (0.25, 4.0, 0.484),
+    (2.0, 8.0, 0.279),
+    (1.0, 8.0, 0.357),
+    (0.5, 8.0, 0.469),
+    (0.25, 8.0, 0.580),
+    (2.0, 16.0, 0.388),
+    (1.0, 16.0, 0.481),
+    (0.5, 16.0, 0.595),
+    (0.25, 16.0, 0.731),
+];
+
+/// Slope of the least squares line through the times over the index of difficulty log₂(2A/W) [ms a bit]. N movements take N·T + (N − 1)·τ. The people of Fitts
+/// had 94.7 ms a bit.
+#[test]
+fn a_bit_of_difficulty_costs_a_tenth_more_than_with_people() {
+    let difficulty = |(width, distance, _): &(f64, f64, f64)| (2.0 * distance / width).log2();
+    let mean = TAPPING.iter().map(difficulty).sum::<f64>() / 16.0;
+    let slope = |time: &mut dyn FnMut(&(f64, f64, f64)) -> f64| {
+        let (mut products, mut squares) = (0.0, 0.0);
+        for target in &TAPPING {
+            let apart = difficulty(target) - mean;
+            products += apart * time(target);
+            squares += apart * apart;
+        }
+        1e3 * products / squares
+    };
+    assert!((slope(&mut |(_, _, people)| *people) - 94.7).abs() < 0.05);
+    let (mut state, runs) = (7, 100_000_u32);
+    let found = slope(&mut |(width, distance, _)| {
+        let count: u64 = (0..runs).map(|_| movements(2.0 * distance / width, 0.1, &mut state)).sum();
+        0.45 * (count as f64 / f64::from(runs)) - 0.2
+    });
+    // A number of movements has a standard deviation below 1, so a mean time one below 1.5 ms, and the squares of the index sum to 40: below 0.25 ms a bit.
+    assert!((found - 103.5).abs() < 0.5, "{found}");
+}
+
 /// Steering law (Accot & Zhai 1997): along a lane of the width w, a person aims w/(4c) ahead and needs (T + τ)·4c/w for a length. The mean difference of the
 /// times for two lengths is that of a renewal process, without the movements at both ends.
 #[test]
