@@ -187,6 +187,19 @@ mod tests {
         assert_eq!((submovements(&pair), submovements(&single)), (2, 1));
     }
 
+    /// A minimum jerk over a time T has the speed 1.875·D/T at its peak and the squared jerk 720·D²/T⁵ as its integral, so that the jerk without dimension is
+    /// 720/1.875² = 204.8. The n samples count as the time n·Δ, which is one Δ too long. The sum of second differences leaves out half a Δ at either end, where
+    /// the squared jerk is five times the mean.
+    #[test]
+    fn many_samples_of_a_minimum_jerk_come_to_the_closed_form() {
+        let seconds = 1000.0;
+        let dense = sampled(100_001, 0.0, |t| minimum_jerk(1.0, seconds, t));
+        let closed_form = -libm::log(204.8);
+        let (too_long, left_out) = (3.0 * libm::log1p(PERIOD_S / seconds), libm::log1p(-5.0 * PERIOD_S / seconds));
+        let found = log_dimensionless_jerk(&dense).unwrap();
+        assert!((found + too_long + left_out - closed_form).abs() < 1e-7, "{found}, expected {closed_form}");
+    }
+
     #[test]
     fn a_ripple_below_the_threshold_is_no_submovement() {
         assert_eq!(submovements(&[0.0, 0.1, 0.096, 0.1, 0.0]), 1);
