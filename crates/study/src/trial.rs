@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use cohaptic_linkfile::FileError;
 use cohaptic_linkfile::document::key_text;
-use cohaptic_scene::{Scene, TaskKind, scene_text};
+use cohaptic_scene::{Scene, scene_text};
 
 use crate::model::{Person, Study};
 use crate::sequence::TrialPlan;
@@ -47,6 +47,11 @@ impl Study {
         self.scene_with(condition, [])
     }
 
+    /// Reads the scene of a condition with modelled persons at the hands, indexed by seat.
+    pub(crate) fn scene_of_persons(&self, condition: usize, persons: &[Person]) -> Result<TrialScene, FileError> {
+        self.scene_with(condition, self.players(condition, Players::Modelled(persons)))
+    }
+
     fn scene_with(&self, condition: usize, more: impl IntoIterator<Item = String>) -> Result<TrialScene, FileError> {
         let measures: Vec<String> = self.measures.iter().map(|name| format!("\"{name}\"")).collect();
         let mut overrides = self.conditions[condition].overrides.clone();
@@ -62,12 +67,6 @@ impl Study {
         let scene = Scene::parse_live(&text, &self.scene_file, &[])?;
         let hands = self.hands.iter().filter_map(|name| scene.peer_index(name)).collect();
         Ok(TrialScene { text, scene, hands })
-    }
-
-    /// Returns whether the target of a condition moves; `None` for a condition whose scene is refused.
-    pub(crate) fn tracks(&self, condition: usize) -> Option<bool> {
-        let task = self.condition_scene(condition).ok()?.scene.task;
-        Some(task.is_some_and(|task| matches!(task.kind, TaskKind::Track(_))))
     }
 
     /// Returns the overrides that put persons at the hands.

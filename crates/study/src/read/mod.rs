@@ -13,7 +13,7 @@ use cohaptic_linkfile::FileError;
 use cohaptic_linkfile::document::{Node, Sources, quote};
 use cohaptic_linkfile::reading::named_file::{file_path, read_file};
 use cohaptic_linkfile::reading::{Context, FileReader, TableReader, default_title, one_of, parse_with, values, with_text};
-use cohaptic_scene::{Measure, MeasureName, PeerKind, Scene, Scope, scene_content_of_text};
+use cohaptic_scene::{Measure, MeasureName, PeerKind, Scene, Scope, TaskKind, scene_content_of_text};
 use cohaptic_units::print::{Counted, Span};
 
 use crate::model::{Breaks, Order, Study};
@@ -46,12 +46,7 @@ impl Study {
 
     /// Like [`Study::parse`], but `reader` reads the named files.
     pub(crate) fn parse_with(text: &str, file: &Path, reader: FileReader<'_>) -> Result<Self, FileError> {
-        let study = parse_with(Sources { file, text, overrides: &[] }, reader, read_document)?.whole;
-        // Every condition is read once here: a fault must not wait until a group comes to its trial.
-        for condition in 0..study.conditions.len() {
-            study.condition_scene(condition)?;
-        }
-        Ok(study)
+        Ok(parse_with(Sources { file, text, overrides: &[] }, reader, read_document)?.whole)
     }
 }
 
@@ -143,41 +138,60 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Study> {
         limit: limit(&scene),
         operator: operator?,
     };
-    let tracks: Vec<Option<bool>> = (0..study.conditions.len()).map(|condition| study.tracks(condition)).collect();
-    for (condition, tracks) in study.conditions.iter_mut().zip(&tracks) {
-        condition.tracks = tracks.unwrap_or(false);
+    let tracks = read_scenes(&study, conditions_node.or(header.scene_node)?, context)?;
+    for (condition, tracks) in study.conditions.iter_mut().zip(tracks) {
+        condition.tracks = tracks;
     }
-    if let Some(node) = conditions_node
-        && let Some(message) = unfit_condition(&study)
-    {
-        context.fault_at(node, message);
-        return None;
-    }
-    // A refused scene has a message of its own, and its task is not known.
     if let Some(node) = operator_node
-        && tracks.iter().all(Option::is_some)
-        && !operator::is_used(&study, node, context)
+        && !(operator::is_used(&study, node, context) && operator::fits(&study, node, context))
     {
         return None;
     }
     Some(study)
 }
 
-/// Returns why a condition changes what all conditions share, in words; `None` if none does. A condition whose scene is refused has a message of its own.
-fn unfit_condition(study: &Study) -> Option<String> {
-    study.conditions.iter().enumerate().find_map(|(place, condition)| {
-        let TrialScene { text, scene, .. } = study.condition_scene(place).ok()?;
-        let unfit = unkept(&scene, &text, &study.scene_file).or_else(|| {
-            (hands(&scene) != study.hands).then(|| format!("the pointers are {}: expected {}", hands(&scene).join(", "), study.hands.join(", ")))
-        });
-        let other_limit = || {
-            let message = || {
-                format!("a task may take {}, and {} in the scene: expected the same time in all conditions", Span(limit(&scene)), Span(study.limit))
-            };
-            (limit(&scene) != study.limit).then(message)
+/// Reads the scene of each condition, because a fault must not wait until a group comes to its trial. Returns whether the target of the task moves, indexed by
+/// condition. `None` if a scene is refused or changes what all conditions share, which is reported at `conditions`.
+fn read_scenes(study: &Study, conditions: &Node, context: Context<'_>) -> Option<Vec<bool>> {
+    let mut tracks = Vec::new();
+    for (place, condition) in study.conditions.iter().enumerate() {
+        let (node, message) = match study.condition_scene(place) {
+            Ok(TrialScene { text, scene, .. }) => {
+                let Some(message) = unfit(study, &text, &scene) else {
+                    tracks.push(scene.task.is_some_and(|task| matches!(task.kind, TaskKind::Track(_))));
+                    continue;
+                };
+                (conditions, message)
+            }
+            Err(error) => refused_scene(&error, conditions),
         };
-        unfit.or_else(other_limit).map(|message| format!("in the condition {}, {message}", quote(&condition.label)))
-    })
+        context.fault_at(node, format!("in the condition {}, {message}", quote(&condition.label)));
+        return None;
+    }
+    Some(tracks)
+}
+
+/// Returns the key of `conditions` whose value is refused, or the whole table, and the fault in words.
+fn refused_scene<'a>(error: &FileError, conditions: &'a Node) -> (&'a Node, String) {
+    let Some(diagnostic) = error.diagnostic() else { return (conditions, error.to_string()) };
+    let key = diagnostic.override_text().and_then(|text| text.split_once('=')).map(|(key, _)| key);
+    let node = key.and_then(|key| conditions.as_table()?.get(key)).map_or(conditions, |entry| &entry.node);
+    let message = diagnostic.message();
+    (node, if diagnostic.key().is_empty() { message.to_owned() } else { format!("{}: {message}", diagnostic.key()) })
+}
+
+/// Returns how the scene of a condition changes what all conditions share, in words; `None` if it does not.
+fn unfit(study: &Study, text: &str, scene: &Scene) -> Option<String> {
+    let other_hands = || {
+        let message = || format!("the pointers are {}: expected {}", hands(scene).join(", "), study.hands.join(", "));
+        (hands(scene) != study.hands).then(message)
+    };
+    let other_limit = || {
+        let message =
+            || format!("a task may take {}, and {} in the scene: expected the same time in all conditions", Span(limit(scene)), Span(study.limit));
+        (limit(scene) != study.limit).then(message)
+    };
+    unkept(scene, text, &study.scene_file).or_else(other_hands).or_else(other_limit)
 }
 
 /// Returns why a study could not keep all of a scene, in words; `None` for a scene that is kept as a whole.

@@ -1,5 +1,7 @@
 //! Reader of `[operator]`: means of the modelled persons.
 
+use std::time::Duration;
+
 use cohaptic_linkfile::document::Node;
 use cohaptic_linkfile::reading::{Context, TableReader};
 
@@ -15,6 +17,29 @@ pub(super) fn read_operator(node: &Node, context: Context<'_>) -> Option<Person>
     let (reaction, noise, crossover) = (table.value("reaction"), table.value("noise"), table.value("crossover"));
     table.finish();
     Some(Person { movement: movement?, visual_delay: visual_delay?, reaction: reaction?, noise: noise?, crossover: crossover? })
+}
+
+/// Factor of the mean that the numbers of hardly any person exceed: e^(0.15·z) with z = 6.1.
+const MOST: u32 = 5;
+const OVER: u32 = 2;
+
+/// Reports the first key of a table `[operator]` around whose mean a person could have a number that a scene refuses. Returns whether there is no such key.
+pub(super) fn fits(study: &Study, operator: &Node, context: Context<'_>) -> bool {
+    let Person { movement, visual_delay, reaction, noise, crossover } = study.operator;
+    let (factor, times) = (f64::from(MOST) / f64::from(OVER), |duration: Duration| duration * MOST / OVER);
+    let extreme =
+        Person { movement: times(movement), visual_delay: times(visual_delay), reaction, noise: noise * factor, crossover: crossover * factor };
+    let refused = (0..study.conditions.len()).find_map(|condition| {
+        let error = study.scene_of_persons(condition, &vec![extreme; study.group_size()]).err()?;
+        let diagnostic = error.diagnostic()?;
+        // A key that the table leaves out has its usual mean. The scene may refuse this mean too, but a study with people needs no modelled persons.
+        let entry = operator.as_table()?.get(diagnostic.key().rsplit('.').next()?)?;
+        Some((&*entry.node, format!("a person may have {factor} times this mean: {}", diagnostic.message())))
+    });
+    if let Some((node, message)) = &refused {
+        context.fault_at(node, message.as_str());
+    }
+    refused.is_none()
 }
 
 /// Reports the first key of a table `[operator]` that no condition uses. Returns whether every key is used.
