@@ -205,7 +205,7 @@ impl Visiting {
                 Heard::Newest(_) => visits.newest += 1,
                 Heard::Late(_) => visits.late += 1,
                 Heard::Welcome => {}
-                Heard::Ignored => visits.ignored += 1,
+                Heard::Taken | Heard::Ignored => visits.ignored += 1,
             })? > 0
             {}
         }

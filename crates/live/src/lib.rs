@@ -4,7 +4,8 @@
 //!
 //! [`Session`] is such a session, with its sockets and its clock. [`AdmissionControl`] decides which datagrams from outside reach the scene, and makes the
 //! datagrams to programs outside. It does no input or output and reads no clock. [`client`] is the side of a peer, for programs in Rust, and [`handshake`] has
-//! the datagrams that both sides exchange before the samples. [`join`] is a whole peer at another computer than the session. The protocol is written byte by byte in `docs/live-protocol.md`.
+//! the datagrams beside samples. [`join`] is a whole peer at another computer than the session. The protocol is written byte by byte in
+//! `docs/live-protocol.md`.
 //!
 //! The crate does not encrypt: with a [`SessionKey`] strangers cannot send samples, but can still read samples. Read [`AdmissionControl`] first.
 //!
@@ -55,6 +56,7 @@ pub mod pointers;
 mod scene_hand;
 mod seal;
 mod session;
+mod stale;
 
 pub use admission::{
     Admission, AdmissionConfig, AdmissionConfigError, AdmissionControl, AdmissionStats, Admitted, Limits, OtherScene, Refusal, Seat, SeatStatus,
@@ -68,3 +70,4 @@ pub use session::{
     Conductor, Connection, EndedPacket, LinkChange, LinkStatus, Motion, PeerStatus, Recorded, Report, Session, SessionConfig, SessionError,
     SocketCounts, Status,
 };
+pub use stale::stale_after;

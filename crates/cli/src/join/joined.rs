@@ -1,12 +1,16 @@
 //! Peer at this computer and its session, with the words during a run: the line of status, and the reasons for no welcome.
 
 use std::net::SocketAddr;
+use std::time::Duration;
 
 use cohaptic_live::join::JoinedStatus;
-use cohaptic_scene::{Fingerprint, Scene};
+use cohaptic_scene::{Fingerprint, PeerKind, Scene};
 use cohaptic_units::print::Span;
 
 use crate::arguments::JoinDevice;
+
+/// Time after a welcome in which a refusal of the first sample would have come.
+const SETTLED: Duration = Duration::from_millis(500);
 
 /// Peer at this computer, and its session.
 pub(super) struct Joined<'a> {
@@ -25,11 +29,33 @@ impl Joined<'_> {
         if self.is_keyed { status.began.is_some() } else { status.age.is_some() }
     }
 
+    /// Returns whether the session takes samples of this peer: the session has sent a sample, or has refused none since the welcome. Nobody else may send.
+    pub(super) fn takes_part(&self, status: &JoinedStatus) -> bool {
+        let is_settled = self.is_keyed && status.began.is_some() && status.elapsed >= SETTLED;
+        !status.is_seat_taken && (status.age.is_some() || is_settled)
+    }
+
+    /// Returns the sentence about a seat of another program.
+    pub(super) fn taken(&self) -> String {
+        let Self { scene, place, session, .. } = self;
+        let name = &scene.peers[*place].name;
+        format!("the seat of {name} at place {place} is taken: another program is {name} in the session at {session}")
+    }
+
+    /// Returns what a user can do about a taken seat.
+    pub(super) fn ways_out(&self) -> String {
+        let others = self.scene.peers.iter().enumerate().filter(|(place, peer)| *place != self.place && matches!(peer.kind, PeerKind::Udp(_)));
+        let names: Vec<String> = others.map(|(_, peer)| format!("--peer {}", peer.name)).collect();
+        let otherwise = if names.is_empty() { "join another session".to_owned() } else { format!("join with {}", names.join(" or ")) };
+        format!("End that program, whose address the session's report and page show, or {otherwise}")
+    }
+
     /// Returns the line of status: `left: falcon here, session present, last sample 3 ms ago, 2 of 1000 lost`.
     pub(super) fn line(&self, status: &JoinedStatus) -> String {
         let name = &self.scene.peers[self.place].name;
         let device = if status.is_device_there { "here" } else { "not ready" };
         let session = match (status.began, status.is_session_there) {
+            _ if status.is_seat_taken => "refuses: the seat is taken",
             (None, _) => "not heard",
             (Some(_), true) => "present",
             (Some(_), false) => "silent",

@@ -12,9 +12,10 @@ use std::time::Duration;
 
 use cohaptic_device::Device;
 use cohaptic_harness::live::RecordedScene;
-use cohaptic_live::Label;
-use cohaptic_live::join::{Join, JoinConfig, JoinError, JoinReport, JoinedConfig, JoinedStatus};
+use cohaptic_live::join::{Join, JoinConfig, JoinError, JoinReport, JoinedConfig, JoinedStatus, SeatTaken};
+use cohaptic_live::{Label, stale_after};
 use cohaptic_scene::{PeerKind, Scene};
+use cohaptic_units::print::Span;
 
 use crate::arguments::{JoinArguments, JoinDevice};
 use crate::document_schema::DocumentSchema;
@@ -38,10 +39,11 @@ pub(crate) fn join(arguments: &JoinArguments) -> Result<ExitCode, Failure> {
     let identity = RecordedScene::fingerprint_of(&theirs);
     let key = session_key(arguments.key_file.as_deref())?;
     let is_keyed = key.is_some();
+    let stale_after = stale_after(&theirs).expect("the peer itself is of kind udp");
     let _own = arguments.out.as_deref().map(own_folder).transpose()?;
     let config = JoinConfig {
         session: arguments.session,
-        joined: JoinedConfig { key, scene: identity.get(), label: label(arguments.device) },
+        joined: JoinedConfig { key, scene: identity.get(), label: label(arguments.device), stale_after },
         allow_remote: arguments.allow_remote,
         pacing: arguments.pace.pacing(),
         wishes: arguments.pace.wishes(),
@@ -59,6 +61,9 @@ pub(crate) fn join(arguments: &JoinArguments) -> Result<ExitCode, Failure> {
     // The peer has dropped its device, so that the facts are whole.
     let devices = facts.reports(&scene);
     report.validity = exchanges::judge(report.validity, &devices);
+    if report.status.age.is_none() && report.status.is_seat_taken {
+        return Err(Failure::System(format!("{}. {}", joined.taken(), joined.ways_out())));
+    }
     if !joined.was_heard(&report.status) && !interrupt::requested() {
         return Err(Failure::System(joined.reasons(&report.status)));
     }
@@ -173,7 +178,8 @@ const NO_WELCOME: Duration = Duration::from_secs(2);
 #[derive(Default)]
 struct Told {
     reasons: bool,
-    welcomed: bool,
+    taken: bool,
+    takes_part: bool,
     session_away: bool,
     device_away: bool,
 }
@@ -182,21 +188,29 @@ impl Told {
     /// Prints the changes since the last call. `waited`: time since the beginning.
     fn tell(&mut self, joined: &Joined<'_>, status: &JoinedStatus, waited: Duration) {
         let name = &joined.scene.peers[joined.place].name;
-        let was_heard = joined.was_heard(status);
-        if !was_heard && waited >= NO_WELCOME && !std::mem::replace(&mut self.reasons, true) {
+        if status.is_seat_taken {
+            if !std::mem::replace(&mut self.taken, true) {
+                say(&format!("{}; waiting, because that program may have ended without a word", joined.taken()));
+            }
+            // A program without the seat hears nothing from the session: the silence has this cause.
+            return;
+        }
+        self.taken = false;
+        if !joined.was_heard(status) && waited >= NO_WELCOME && !std::mem::replace(&mut self.reasons, true) {
             say(&joined.reasons(status));
         }
-        if was_heard && !std::mem::replace(&mut self.welcomed, true) {
+        if joined.takes_part(status) && !std::mem::replace(&mut self.takes_part, true) {
             say(&format!("the session at {} takes part with {name}", joined.session));
         }
-        if self.welcomed && std::mem::replace(&mut self.session_away, !status.is_session_there) == status.is_session_there {
+        if self.takes_part && std::mem::replace(&mut self.session_away, !status.is_session_there) == status.is_session_there {
             say(if status.is_session_there {
                 "the session is back: the force rises again"
             } else {
-                "nothing new from the session for 1 s: no force, and a new hello every 250 ms"
+                "nothing new from the session for 1 s: no force, and a new hello every 250 ms. If the session does not come back, it has ended, was started \
+                 again with another scene or key, or the network between the two computers fails"
             });
         }
-        if self.welcomed && std::mem::replace(&mut self.device_away, !status.is_device_there) == status.is_device_there {
+        if self.takes_part && std::mem::replace(&mut self.device_away, !status.is_device_there) == status.is_device_there {
             say(&if status.is_device_there {
                 format!("the device is there: {name} is in the session")
             } else {
@@ -209,6 +223,9 @@ impl Told {
 fn refused(error: JoinError, joined: &Joined<'_>) -> Failure {
     if let JoinError::Record(error) = error {
         return error.into();
+    }
+    if let JoinError::SeatTaken(SeatTaken { patience, .. }) = error {
+        return Failure::System(format!("{}, for {} now. {}", joined.taken(), Span(patience), joined.ways_out()));
     }
     let is_of_system = matches!(error, JoinError::Bind(_) | JoinError::System(_) | JoinError::Entropy(_));
     if is_of_system { Failure::System(error.to_string()) } else { Failure::Input(format!("{}: {error}", joined.scene.peers[joined.place].name)) }

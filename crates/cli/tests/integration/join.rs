@@ -131,6 +131,72 @@ fn with_the_key_it_takes_part_and_after_a_loss_of_power_it_joins_again() {
     assert_eq!((seat["joined"].as_u64(), document["door"]["joinings"].as_u64()), (Some(2), Some(2)), "{document:#}");
 }
 
+/// Two programs as the same peer: the second one says so and ends, and takes the seat when the first one has gone.
+fn a_second_join_is_told(key: &str) {
+    let desk = desk();
+    // A program that is kept waiting by a busy machine must not lose its seat.
+    let silence = "--set peers.left.silence.after=4s";
+    let session = Running::begin(desk.command(&format!("live lab.toml --listen 127.0.0.1:0 {key} {silence} --json {UNHURRIED}")));
+    let said = session.said("listening on ");
+    let address = said.split_once(' ').unwrap().0;
+    let line = format!("join {address} lab.toml --peer left --device simulated {key} {silence} {UNHURRIED}");
+    let takes_part = || {
+        let join = Running::begin(desk.command(&line));
+        assert_eq!(join.said("the session at "), format!("{address} takes part with left"));
+        join
+    };
+    let first = takes_part();
+    let taken = format!("the seat of left at place 0 is taken: another program is left in the session at {address}");
+    let way_out = "End that program, whose address the session's report and page show, or join another session";
+    let second = desk.cohaptic(&line);
+    second.assert_refused(3, &[&format!("{taken}, for 5s now. {way_out}")]);
+    assert!(second.stderr.contains(&format!("{taken}; waiting")) && !second.stderr.contains("takes part"), "{}", second.stderr);
+    // An end before that time is no success either.
+    desk.cohaptic(&format!("{line} --for 800ms")).assert_refused(3, &[&format!("{taken}. {way_out}")]);
+    // A killed program holds its seat for the silence. The next program waits that long.
+    first.kill();
+    let outcome = takes_part().end_by("-INT");
+    assert_eq!(outcome.status, Some(130), "{}", outcome.stderr);
+    let document = parse(&session.end_by("-INT").stdout);
+    let refused = document["door"]["refused"]["seat-taken"].as_u64();
+    assert!(refused > Some(0) && document["peers"][0]["seat"]["joined"] == 2, "{document:#}");
+}
+
+#[test]
+fn a_second_join_with_the_key_is_told_that_the_seat_is_taken() {
+    a_second_join_is_told("--key-file session.key");
+}
+
+#[test]
+fn a_second_join_without_a_key_is_told_that_the_seat_is_taken() {
+    a_second_join_is_told("");
+}
+
+/// A session that ends, one that is started again, and one that comes back with another scene.
+#[test]
+fn a_join_outlives_its_session_and_says_how_the_session_is() {
+    let desk = desk();
+    let (first, address) = session(&desk, "");
+    let join = Running::begin(desk.command(&format!("join {address} lab.toml --peer left --device simulated --key-file session.key {UNHURRIED}")));
+    join.said("the session at ");
+    first.end_by("-INT");
+    let silent = join.said("nothing new from the session for 1 s: no force");
+    assert!(silent.contains("it has ended, was started again with another scene or key, or the network"), "{silent}");
+    let again = |words: &str| Running::begin(desk.command(&format!("live lab.toml --listen {address} --key-file session.key {UNHURRIED} {words}")));
+    let other = again("--set link.delay=25ms");
+    let told = other.said("127.0.0.1:");
+    assert!(told.contains(" asked to be left with another scene: "), "{told}");
+    other.end_by("-INT");
+    let second = again("");
+    join.said("the session is back: the force rises again");
+    let outcome = join.end_by("-INT");
+    assert_eq!(outcome.status, Some(130), "{}", outcome.stderr);
+    for part in [" sent in 2 joinings\n", "the session was silent for a second or more 1 time\n"] {
+        assert!(outcome.stdout.contains(part), "no {part:?} in {}", outcome.stdout);
+    }
+    second.end_by("-INT");
+}
+
 #[cfg(feature = "inverse3")]
 #[test]
 fn an_inverse3_joins_and_both_answers_tell_its_exchanges() {

@@ -12,7 +12,7 @@ use cohaptic_units::Instant;
 use zeroize::Zeroizing;
 
 use crate::handshake::hello::HELLO_MAGIC;
-use crate::handshake::{HANDSHAKE_LEN, Hello, Welcome};
+use crate::handshake::{HANDSHAKE_LEN, Hello, Notice, Taken, Welcome};
 use crate::place::Place;
 use crate::seal::{JoiningKeys, MAX_DATAGRAM, SEAL_LEN, Sealed, nonce_of};
 use crate::{Entropy, Nonce, SessionKey};
@@ -95,8 +95,8 @@ impl Admitted {
 /// in its upper 24 bits and the peer's own number in the lower 40 bits. A peer that joins again and counts from 0 is therefore newer than before.
 ///
 /// The driver hands each received datagram to [`AdmissionControl::handle_datagram`], carries out the decision, and asks [`AdmissionControl::seal`] for the
-/// bytes of each sample to a peer outside. There are no deadlines: whether a peer is silent is computed from the instant of the call that needs to know. If
-/// time goes back, no peer becomes silent in between.
+/// bytes of each sample to a peer outside. A sample refused with [`Refusal::SeatTaken`] is answered with [`AdmissionControl::notice`]. There are no
+/// deadlines: whether a peer is silent is computed from the instant of the call that needs to know. If time goes back, no peer becomes silent in between.
 #[derive(Debug)]
 pub struct AdmissionControl {
     session: u64,
@@ -212,6 +212,19 @@ impl AdmissionControl {
             None => self.stats.nobody_there += 1,
         }
         ready
+    }
+
+    /// Returns the answer to `sample`, a datagram refused with [`Refusal::SeatTaken`]: the notice that another program has the seat. Without an answer the
+    /// sender could not tell a taken seat from a session in which nobody else sends. Returns `None` if `sample` is no sample for a seat of this session.
+    #[must_use]
+    pub fn notice(&self, sample: &[u8]) -> Option<Notice> {
+        let (plain, seal) = match &self.key {
+            None => (sample, None),
+            Some(key) => Sealed::split(sample).map(|sealed| (sealed.sample, Some((key, *sealed.client_nonce))))?,
+        };
+        let (Sample { sender, .. }, _) = Sample::<3>::decode_as(plain, self.kind, self.axes).ok()?;
+        let place = self.seats[self.find(Place(sender))?].place();
+        Some(Taken { session: self.session, place, seal }.encode())
     }
 
     /// Returns the counts so far.

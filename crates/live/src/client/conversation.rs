@@ -7,7 +7,7 @@ use cohaptic_peer::wire::{Extra, Sample, SampleKind};
 use cohaptic_units::Instant;
 
 use super::{Joined, Joining};
-use crate::handshake::{HANDSHAKE_LEN, Welcome};
+use crate::handshake::{HANDSHAKE_LEN, Taken, Welcome};
 use crate::{Entropy, EntropyError, Label, MAX_DATAGRAM, Place, SessionKey};
 
 /// Time between two hellos while no welcome comes.
@@ -60,6 +60,8 @@ pub enum Heard {
     Late(Sample<3>),
     /// Welcome for the hello of this client. The client may now seal samples.
     Welcome,
+    /// Notice that another program has the seat: the session refused a sample of this client.
+    Taken,
     /// Invalid datagram, or a datagram for another program.
     Ignored,
 }
@@ -222,6 +224,11 @@ impl Client {
             // The session may have been restarted, and the peers of the session may count from 0 again.
             self.begin_anew(now);
             return Heard::Welcome;
+        }
+        let seal = self.key.as_ref().zip(self.welcome().map(|welcome| welcome.client_nonce));
+        // A client with a key has sent no sample before its first welcome, so that no notice can be for the client.
+        if self.key.is_some() == seal.is_some() && (Taken { session: self.session, place: self.place, seal }).is(datagram) {
+            return Heard::Taken;
         }
         let Some((sample, extra)) = self.open(datagram) else { return Heard::Ignored };
         self.extra = extra;

@@ -1,12 +1,15 @@
-//! The two datagrams that precede the samples in sessions with a key: a [`Hello`] from the peer, and a [`Welcome`] from the session.
+//! The datagrams of a session beside samples. A [`Hello`] from the peer and a [`Welcome`] from the session precede the samples in sessions with a key.
+//! [`Taken`] tells a program that another program has its seat, with a key and without.
 //!
-//! Both datagrams are 88 bytes long. An answer no longer than its request amplifies nothing for a sender with a false address. Both datagrams end with a tag
+//! Hello and welcome are 88 bytes long. An answer no longer than its request amplifies nothing for a sender with a false address. Both datagrams end with a tag
 //! under the session key. Their first four bytes differ, so that neither datagram passes for the other. A hello alone changes nothing in the session.
 
 pub(crate) mod hello;
+mod taken;
 mod welcome;
 
 pub use hello::Hello;
+pub use taken::{Notice, Taken};
 pub use welcome::Welcome;
 
 use crate::SessionKey;

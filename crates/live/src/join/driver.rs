@@ -21,7 +21,7 @@ use cohaptic_units::Instant;
 
 use super::fitness::check;
 use super::recording::Recording;
-use super::{HeardSender, JoinedConfig, JoinedPeer, JoinedStatus, Mismatch, Unfit};
+use super::{HeardSender, JoinedConfig, JoinedPeer, JoinedStatus, Mismatch, SeatTaken, Unfit};
 use crate::{EntropyError, SystemEntropy};
 
 /// Configuration of a joined peer by the wall clock.
@@ -67,6 +67,9 @@ pub enum JoinError {
     /// The session differs from the scene.
     #[error(transparent)]
     Mismatch(#[from] Mismatch),
+    /// Another program has the seat, and keeps the seat.
+    #[error(transparent)]
+    SeatTaken(#[from] SeatTaken),
     /// The record cannot be created or written.
     #[error(transparent)]
     Record(#[from] RecordError),
@@ -195,7 +198,8 @@ impl Join {
     ///
     /// # Errors
     ///
-    /// [`JoinError`] if the session differs from the scene, if the record cannot be written, or if the system does not let the loop wait or receive.
+    /// [`JoinError`] if the session differs from the scene, if another program keeps the seat, if the record cannot be written, or if the system does not let
+    /// the loop wait or receive.
     pub fn run(self, mut look: impl FnMut(&JoinedStatus) -> ControlFlow<()>) -> Result<JoinReport, JoinError> {
         self.run_looked_at(&mut look)
     }
@@ -217,6 +221,9 @@ impl Join {
         }
         if let Some(mismatch) = peer.mismatch() {
             return Err(mismatch.clone().into());
+        }
+        if let Some(taken) = peer.seat_taken() {
+            return Err(taken.into());
         }
         Ok(JoinReport {
             status,
@@ -310,7 +317,10 @@ impl Driven for Join {
     }
 
     fn is_over(&self) -> bool {
-        self.end().is_some_and(|end| self.clock.now() >= end) || self.ended.is_some() || self.peer.mismatch().is_some()
+        self.end().is_some_and(|end| self.clock.now() >= end)
+            || self.ended.is_some()
+            || self.peer.mismatch().is_some()
+            || self.peer.seat_taken().is_some()
     }
 }
 

@@ -15,6 +15,7 @@ use cohaptic_units::Instant;
 use super::device::JoinedDevice;
 use super::fitness::{check, compare};
 use super::others::Others;
+use super::seat::{Notices, SeatTaken};
 use super::{HeardSender, Mismatch, Unfit};
 use crate::client::{Client, ClientConfig, Heard, SILENCE, SessionInfo};
 use crate::{Entropy, EntropyError, Label, MAX_DATAGRAM, Place, SessionKey};
@@ -31,6 +32,8 @@ pub struct JoinedConfig {
     pub scene: u64,
     /// Label of the device, for hellos.
     pub label: Label,
+    /// Silence after which the session gives the seat of a program to another program; see [`stale_after`](crate::stale_after).
+    pub stale_after: Duration,
 }
 
 /// Datagram for the session.
@@ -86,6 +89,7 @@ pub struct JoinedPeer {
     /// Silences of the session so far.
     silences: u64,
     mismatch: Option<Mismatch>,
+    notices: Notices,
 }
 
 /// Coupling between device and copy over time.
@@ -185,6 +189,7 @@ impl JoinedPeer {
             sent: 0,
             silences: 0,
             mismatch: None,
+            notices: Notices::new(config.stale_after),
         })
     }
 
@@ -228,6 +233,7 @@ impl JoinedPeer {
                 // The client admits senders of the scene only.
                 let Some(sender) = self.senders.get_mut(sample.sender as usize) else { return };
                 sender.take(at, sample.sequence, sample.sent);
+                self.notices.end();
                 // A session that was started again counts from 0. The peer sees numbers that go on, or it would take the samples for stale.
                 let sample = Sample { session: self.scene.seed, sequence: sender.taken, ..sample };
                 self.arrived.push_back((at, sample, *self.client.extra()));
@@ -237,6 +243,7 @@ impl JoinedPeer {
                     sender.come_late();
                 }
             }
+            Heard::Taken => self.notices.hear(at),
             Heard::Ignored => {}
         }
     }
@@ -377,6 +384,13 @@ impl JoinedPeer {
         self.mismatch.as_ref()
     }
 
+    /// Returns the holder's claim to the seat of this peer, if the session has told of a holder for longer than a vanished program can be one.
+    #[must_use]
+    pub fn seat_taken(&self) -> Option<SeatTaken> {
+        let (place, patience) = (self.place, self.notices.patience());
+        self.notices.is_for_good().then(|| SeatTaken { place, name: self.scene.peers[place].name.clone(), patience })
+    }
+
     /// Returns the figures of the peer at `now`.
     #[must_use]
     pub fn status(&self, now: Instant) -> JoinedStatus {
@@ -393,6 +407,7 @@ impl JoinedPeer {
             age: latest.map(|latest| now.saturating_duration_since(latest)),
             is_device_there: self.coupling.device,
             is_session_there: self.began.is_some() && self.coupling.session,
+            is_seat_taken: self.notices.is_taken(now),
             silences: self.silences,
             device: cohaptic_peer::Device::state(self.peer.device()),
             object: *self.peer.object().state(),
@@ -437,6 +452,8 @@ pub struct JoinedStatus {
     pub is_device_there: bool,
     /// `true` if a peer of the session was heard within the last second.
     pub is_session_there: bool,
+    /// `true` if the session said within the last second that another program has the seat.
+    pub is_seat_taken: bool,
     /// Silences of the session of at least a second.
     pub silences: u64,
     /// State of the device.

@@ -11,9 +11,11 @@ mod fitness;
 mod heard;
 mod others;
 mod recording;
+mod seat;
 
 pub use drift::{ClockDrift, DRIFT_WINDOW};
 pub use driver::{Join, JoinConfig, JoinError, JoinReport};
 pub use engine::{JoinedConfig, JoinedPeer, JoinedStatus, Outgoing};
 pub use fitness::{Mismatch, Unfit};
 pub use heard::HeardSender;
+pub use seat::SeatTaken;

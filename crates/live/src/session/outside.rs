@@ -3,7 +3,6 @@
 
 use std::net::SocketAddr;
 use std::os::fd::BorrowedFd;
-use std::time::Duration;
 
 use cohaptic_harness::live::{RecordedScene, Transmit};
 use cohaptic_realtime::udp::{self, ReceiveBuffers, UdpEndpoint};
@@ -14,8 +13,10 @@ use cohaptic_units::Instant;
 use super::files::Release;
 use super::status::{Connection, SocketCounts};
 use super::{SessionConfig, SessionError};
-use crate::handshake::HANDSHAKE_LEN;
-use crate::{Admission, AdmissionConfig, AdmissionControl, AdmissionStats, Limits, MAX_DATAGRAM, OtherScene, Place, Seat, SystemEntropy};
+use crate::handshake::{HANDSHAKE_LEN, Notice};
+use crate::{
+    Admission, AdmissionConfig, AdmissionControl, AdmissionStats, Limits, MAX_DATAGRAM, OtherScene, Place, Refusal, Seat, SystemEntropy, stale_after,
+};
 
 /// Socket and admission of a session, with the buffers of both directions.
 #[derive(Debug)]
@@ -29,8 +30,25 @@ pub(super) struct Outside {
     is_more: bool,
     /// Buffer for making each outgoing datagram before the socket copies the datagram into the queue.
     sealed: [u8; MAX_DATAGRAM],
-    /// Welcomes to be sent with the next [`Outside::flush`], with the address of each receiver. At most as many as a batch has datagrams.
-    replies: Vec<(SocketAddr, [u8; HANDSHAKE_LEN])>,
+    /// Answers to be sent with the next [`Outside::flush`], with the address of each receiver. At most as many as a batch has datagrams.
+    replies: Vec<(SocketAddr, Answer)>,
+}
+
+/// Answer of the session to a datagram.
+#[derive(Debug)]
+enum Answer {
+    Welcome([u8; HANDSHAKE_LEN]),
+    /// Another program has the seat.
+    Taken(Notice),
+}
+
+impl Answer {
+    fn bytes(&self) -> &[u8] {
+        match self {
+            Self::Welcome(bytes) => bytes,
+            Self::Taken(notice) => notice.bytes(),
+        }
+    }
 }
 
 /// Largest admitted position \[m\] and velocity [m/s]. A hand at a desk stays well below both; a larger number comes from a fault, and would throw every other
@@ -44,18 +62,10 @@ const RECEIVE_BUFFER: usize = 1 << 20;
 impl Outside {
     /// Binds the socket and makes the admission. Returns `None` in a scene without peers in other programs.
     pub(super) fn open(scene: &Scene, config: &SessionConfig) -> Result<Option<Self>, SessionError> {
-        let seats: Vec<(Seat, Duration)> = scene
-            .peers
-            .iter()
-            .zip(0..)
-            .filter_map(|(peer, place)| {
-                let PeerKind::Udp(silence) = peer.kind else { return None };
-                Some((Seat { place: Place(place), name: peer.name.clone(), tick: peer.clock.tick }, silence.after))
-            })
-            .collect();
-        // One time for all seats, the longest of the peers' silences: a seat can be taken again only when the scene, too, counts the peer as silent. No maximum
-        // means no seats: the scene has no peer in another program, and needs no socket.
-        let Some(stale_after) = seats.iter().map(|(_, after)| *after).max() else { return Ok(None) };
+        // Without seats the scene has no peer in another program, and needs no socket.
+        let Some(stale_after) = stale_after(scene) else { return Ok(None) };
+        let elsewhere = scene.peers.iter().zip(0..).filter(|(peer, _)| matches!(peer.kind, PeerKind::Udp(_)));
+        let seats: Vec<Seat> = elsewhere.map(|(peer, place)| Seat { place: Place(place), name: peer.name.clone(), tick: peer.clock.tick }).collect();
         let address = config.listen;
         // A mapped IPv4 address must be judged as IPv4: `::ffff:127.0.0.1` is a loopback address, too.
         if !address.ip().to_canonical().is_loopback() && config.key.is_none() && !config.allow_remote {
@@ -64,7 +74,6 @@ impl Outside {
         // With a single peer outside, received samples go to peers of this process only.
         let passes_on = seats.len() > 1;
         let peers = u32::try_from(scene.peers.len()).expect("a scene that runs has few peers");
-        let seats = seats.into_iter().map(|(seat, _)| seat).collect();
         let admission = AdmissionConfig {
             stale_after,
             limits: Some(LIMITS),
@@ -91,14 +100,17 @@ impl Outside {
     }
 
     /// Reads a batch of datagrams. Calls `take` for each admitted sample, with the instant at which the kernel received the datagram and the index of the
-    /// sending peer. Welcomes are sent with the next [`Outside::flush`]. Returns the number of datagrams read.
+    /// sending peer. Answers are sent with the next [`Outside::flush`]. Returns the number of datagrams read.
     pub(super) fn receive(&mut self, clock: &MonotonicClock, mut take: impl FnMut(Instant, usize, &[u8])) -> std::io::Result<usize> {
         let Self { socket, buffers, admission, is_more, replies, .. } = self;
         // A batch is more than arrives between two ticks of an orderly session. Further datagrams stay in the kernel until the next reading, which comes after
         // the next tick if the tick is due: a flood cannot keep the loop from its ticks.
         let count = socket.receive(buffers, clock, |datagram| match admission.handle_datagram(datagram.at, datagram.from, datagram.bytes) {
             Admission::Sample { place, sample, .. } => take(datagram.at, place.0 as usize, sample.bytes()),
-            Admission::Reply { to, bytes } => replies.push((to, bytes)),
+            Admission::Reply { to, bytes } => replies.push((to, Answer::Welcome(bytes))),
+            Admission::Refused(Refusal::SeatTaken) => {
+                replies.extend(admission.notice(datagram.bytes).map(|notice| (datagram.from, Answer::Taken(notice))))
+            }
             Admission::Refused(_) => {}
         })?;
         // A batch with room left has emptied the socket.
@@ -117,12 +129,12 @@ impl Outside {
         Some(Release { to: transmit.to, due: transmit.at, late: now.saturating_duration_since(transmit.at) })
     }
 
-    /// Sends the queued samples, and then the welcomes. In this order a flood of hellos cannot delay samples. A welcome without room in the kernel is dropped
-    /// and counted, and the peer repeats the hello.
+    /// Sends the queued samples, and then the answers. In this order a flood of hellos cannot delay samples. An answer without room in the kernel is dropped
+    /// and counted, and the peer repeats the question.
     pub(super) fn flush(&mut self) {
         self.socket.flush();
-        for (to, bytes) in self.replies.drain(..) {
-            self.socket.send_or_drop(to, &bytes);
+        for (to, answer) in self.replies.drain(..) {
+            self.socket.send_or_drop(to, answer.bytes());
         }
     }
 

@@ -1,7 +1,8 @@
 //! Datagrams of strangers: no datagram changes a seat, causes a panic or uses up memory, and every datagram is counted once.
 
 use cohaptic_live::client::{Client, ClientConfig, Heard, Joined};
-use cohaptic_live::{Admission, AdmissionControl, MAX_DATAGRAM, Refusal};
+use cohaptic_live::handshake::Taken;
+use cohaptic_live::{Admission, AdmissionControl, MAX_DATAGRAM, Place, Refusal};
 use proptest::prelude::*;
 
 use crate::support::{
@@ -160,6 +161,34 @@ proptest! {
             prop_assert!(joining(1).handle_welcome(bytes).is_err());
             prop_assert_eq!(client.handle_datagram(at(1), bytes), Heard::Ignored);
         }
+    }
+}
+
+/// A notice counts for the joining whose sample was refused, under the key, and bit by bit.
+#[test]
+fn a_forged_or_recorded_notice_tells_a_client_nothing() {
+    let mut door = keyed_door();
+    let mut client = Client::new(ClientConfig::Keyed { session: SESSION, place: SEAT, key: key() }, at(0));
+    let nobody = Taken { session: SESSION, place: SEAT, seal: None }.encode();
+    assert_eq!(client.handle_datagram(at(0), nobody.bytes()), Heard::Ignored, "without a tag, before the welcome");
+    let hello = client.poll_hello(at(0), &mut Counting::default()).unwrap().unwrap();
+    let Admission::Reply { bytes, .. } = door.handle_datagram(at(0), address(1), &hello) else { panic!("no welcome") };
+    client.handle_datagram(at(0), &bytes);
+    let nonce = client.welcome().unwrap().client_nonce;
+    let good = Taken { session: SESSION, place: SEAT, seal: Some((&key(), nonce)) };
+    assert_eq!(client.handle_datagram(at(1), good.encode().bytes()), Heard::Taken);
+    for bit in 0..8 * good.encode().bytes().len() {
+        let mut bad = good.encode().bytes().to_vec();
+        bad[bit / 8] ^= 1 << (bit % 8);
+        assert_eq!(client.handle_datagram(at(1), &bad), Heard::Ignored, "bit {bit}");
+    }
+    for bad in [
+        Taken { session: 43, ..good },
+        Taken { place: Place(2), ..good },
+        Taken { seal: Some((&key(), [7; 16])), ..good },
+        Taken { seal: None, ..good },
+    ] {
+        assert_eq!(client.handle_datagram(at(1), bad.encode().bytes()), Heard::Ignored, "{bad:?}");
     }
 }
 

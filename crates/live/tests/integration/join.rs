@@ -8,7 +8,7 @@ use cohaptic_device::{Description, Device, GatedForce, Reading, Stopper};
 use cohaptic_harness::TickRow;
 use cohaptic_harness::live::LiveScene;
 use cohaptic_live::join::{JoinedConfig, JoinedPeer, Unfit};
-use cohaptic_live::{Admission, AdmissionConfig, AdmissionControl, Label, MAX_DATAGRAM, Place, Seat, SessionKey};
+use cohaptic_live::{Admission, AdmissionConfig, AdmissionControl, Label, MAX_DATAGRAM, Place, Refusal, Seat, SessionKey};
 use cohaptic_peer::{State, wire};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
@@ -27,7 +27,7 @@ pub(crate) fn scene(overrides: &[&str]) -> Scene {
 }
 
 pub(crate) fn config(key: Option<SessionKey>) -> JoinedConfig {
-    JoinedConfig { key, scene: 7, label: Label::new("test").unwrap() }
+    JoinedConfig { key, scene: 7, label: Label::new("test").unwrap(), stale_after: Duration::from_secs(1) }
 }
 
 fn peer(overrides: &[&str], key: Option<SessionKey>, device: Option<Box<dyn Device>>) -> JoinedPeer {
@@ -414,6 +414,72 @@ fn the_pull_of_another_peer_elsewhere_fades_as_in_a_session() {
     expect(&mut left, 1918, 1.0);
     expect(&mut left, 1968, 0.5);
     expect(&mut left, 2030, 0.0);
+}
+
+/// Two programs ask for the same seat, with a key and without. The second one learns of the first one, and gives up after a time in which a vanished program
+/// would have lost the seat. If the first one vanishes, the second one takes the seat before.
+#[test]
+fn a_peer_without_a_seat_learns_so_and_waits_for_a_vanished_holder() {
+    for (key, end) in [(Some(key()), u64::MAX), (None, u64::MAX), (Some(key()), 1000), (None, 1000)] {
+        let elsewhere = scene(&["peers.left.kind=udp", "scene.duration=10s"]);
+        let mut live = LiveScene::new(&elsewhere, |_| None);
+        let seats = vec![Seat { place: Place(0), name: "left".to_owned(), tick: Duration::from_millis(1) }];
+        let admission = AdmissionConfig::new(7, 1, 2, Duration::from_millis(8), seats).with_key(key.clone());
+        let mut door = AdmissionControl::new(admission, &mut Counting::default()).unwrap();
+        let mut lefts = [peer(&[], key.clone(), None), peer(&[], key.clone(), None)];
+        let mut entropy = [Counting::default(), Counting::default()];
+        let (mut taken_from, mut gives_up, mut takes_part) = (None, None, None);
+        for millis in 0..4000 {
+            let now = at(1000 * millis);
+            for (port, left) in lefts.iter_mut().enumerate() {
+                // The second program begins after the first one, and the first one ends.
+                if if port == 0 { millis >= end } else { millis < 100 } {
+                    continue;
+                }
+                let from = address(1 + u16::try_from(port).unwrap());
+                while left.poll_timeout() <= now {
+                    left.handle_timeout(now, &mut entropy[port], &mut |_, _| ()).unwrap();
+                    while let Some(datagram) = left.poll_transmit() {
+                        match door.handle_datagram(now, from, datagram.bytes()) {
+                            Admission::Sample { sample, .. } => {
+                                live.handle_sample(now, 0, sample.bytes(), &mut Rows::default()).unwrap().unwrap();
+                            }
+                            Admission::Reply { bytes, .. } => left.handle_datagram(now, &bytes),
+                            Admission::Refused(Refusal::SeatTaken) => {
+                                left.handle_datagram(now, door.notice(datagram.bytes()).unwrap().bytes());
+                            }
+                            Admission::Refused(cause) => panic!("{cause}"),
+                        }
+                    }
+                }
+            }
+            while live.poll_timeout().is_some_and(|due| due <= now) {
+                live.handle_timeout(now, &mut Rows::default()).unwrap();
+            }
+            let mut sealed = [0; MAX_DATAGRAM];
+            while let Some(transmit) = live.poll_transmit() {
+                if let Some((to, len)) = door.seal(now, Place(0), &transmit.datagram, &mut sealed) {
+                    lefts[usize::from(to.port()) - 1].handle_datagram(now, &sealed[..len]);
+                }
+            }
+            assert!(!lefts[0].status(now).is_seat_taken && lefts[0].seat_taken().is_none());
+            let second = lefts[1].status(now);
+            taken_from = taken_from.or_else(|| second.is_seat_taken.then_some(millis));
+            takes_part = takes_part.or_else(|| second.age.map(|_| millis));
+            gives_up = gives_up.or_else(|| lefts[1].seat_taken().map(|_| millis));
+            assert!(second.age.is_none() || !second.is_seat_taken, "{millis}: the seat is the second program's");
+        }
+        // The clock of the second program begins at 100 ms, and the first sample of every row of 8 ms is refused.
+        assert!(taken_from.is_some_and(|millis| (100..120).contains(&millis)), "{taken_from:?}");
+        if end == u64::MAX {
+            assert!(gives_up.is_some_and(|millis| (2100..2130).contains(&millis)) && takes_part.is_none(), "{gives_up:?}, {takes_part:?}");
+            let text = lefts[1].seat_taken().unwrap().to_string();
+            assert_eq!(text, "the seat at place 0 is taken: for 2s the session has refused the samples from here, because another program is left");
+        } else {
+            // The last sample of the first program came before 1 s, so that its seat is free before 2 s, and a sample needs 24.5 ms.
+            assert!(takes_part.is_some_and(|millis| (1990..2040).contains(&millis)) && gives_up.is_none(), "{takes_part:?}, {gives_up:?}");
+        }
+    }
 }
 
 #[test]

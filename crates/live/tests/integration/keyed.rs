@@ -1,10 +1,11 @@
 //! Sessions with a key: hello, welcome, and samples sealed under the keys of their joining.
 
-use cohaptic_live::client::OpenError;
+use cohaptic_live::client::{Joined, OpenError};
+use cohaptic_live::handshake::Taken;
 use cohaptic_live::{Admission, AdmissionConfig, AdmissionControl, Label, MAX_DATAGRAM, OtherScene, Place, Refusal, SessionKey};
 use cohaptic_peer::wire;
 
-use crate::support::{Counting, SEAT, SESSION, address, admitted, assert_counts, at, config, joining, keyed_door, sample, sealed, shake_hands};
+use crate::support::{Counting, SEAT, SESSION, address, admitted, assert_counts, at, config, joining, key, keyed_door, sample, sealed, shake_hands};
 
 #[test]
 fn a_peer_says_hello_is_welcomed_and_joins_with_its_first_sample() {
@@ -95,7 +96,7 @@ fn a_recording_of_an_earlier_joining_is_worthless() {
     // Replayed at another door with the same key and the same session: the nonces differ.
     let mut other = Counting::default();
     cohaptic_live::Entropy::fill(&mut other, &mut [0; 64]).unwrap();
-    let mut door = AdmissionControl::new(config().with_key(Some(crate::support::key())), &mut other).unwrap();
+    let mut door = AdmissionControl::new(config().with_key(Some(key())), &mut other).unwrap();
     for datagram in &recording {
         door.handle_datagram(at(0), address(1), datagram);
     }
@@ -110,6 +111,11 @@ fn a_present_peer_is_not_thrown_out_and_a_silent_one_is_replaced() {
     // A second program has the key, and asks for the same place.
     let second = shake_hands(&mut door, at(10), address(2), &joining(2));
     assert_eq!(door.handle_datagram(at(10), address(2), &sealed(&second, &sample(1, 0))), Admission::Refused(Refusal::SeatTaken));
+    // The notice is the second program's alone.
+    let notice = door.notice(&sealed(&second, &sample(1, 0))).unwrap();
+    let taken = |joined: &Joined| Taken { session: SESSION, place: SEAT, seal: Some((&key(), joined.welcome().client_nonce)) }.is(notice.bytes());
+    assert_eq!((taken(&second), taken(&first), notice.bytes().len()), (true, false, 56));
+    assert_eq!(door.notice(&sample(1, 0)), None, "not sealed");
     admitted(door.handle_datagram(at(11), address(1), &sealed(&first, &sample(1, 1))));
     let (joined, passed) = admitted(door.handle_datagram(at(111), address(2), &sealed(&second, &sample(1, 1))));
     assert!(joined, "its welcome is still good: nobody has joined since");
@@ -149,7 +155,7 @@ fn a_peer_that_was_silent_goes_on_under_its_keys() {
 #[test]
 fn each_fault_of_a_hello_has_its_own_count() {
     let mut door = keyed_door();
-    let hello = |session: u64, place: u32| cohaptic_live::client::Joining::new(session, Place(place), &crate::support::key(), [1; 16]).hello();
+    let hello = |session: u64, place: u32| cohaptic_live::client::Joining::new(session, Place(place), &key(), [1; 16]).hello();
     let mut refuse = |cause: Refusal, bytes: &[u8]| {
         assert_eq!(door.handle_datagram(at(0), address(1), bytes), Admission::Refused(cause), "{cause}");
     };
@@ -177,7 +183,7 @@ fn secrets_are_not_printed() {
     let mut door = keyed_door();
     let joined = shake_hands(&mut door, at(0), address(1), &joining(1));
     admitted(door.handle_datagram(at(0), address(1), &sealed(&joined, &sample(1, 0))));
-    let printed = format!("{door:?} {joined:?} {:?} {:?}", config().with_key(Some(crate::support::key())), joining(1));
+    let printed = format!("{door:?} {joined:?} {:?} {:?}", config().with_key(Some(key())), joining(1));
     // The key is 32 times the byte 0xa5, which is 165.
     assert!(!printed.contains("165, 165") && !printed.to_lowercase().contains("a5a5"), "{printed}");
     assert!(printed.contains("SessionKey(secret)") && printed.contains("WayKey(secret)"));
@@ -186,8 +192,7 @@ fn secrets_are_not_printed() {
 #[test]
 fn a_peer_of_another_scene_is_counted_and_not_answered() {
     let scene = 0x8594_4171_f739_67e8;
-    let mut door =
-        AdmissionControl::new(AdmissionConfig { scene, ..config().with_key(Some(crate::support::key())) }, &mut Counting::default()).unwrap();
+    let mut door = AdmissionControl::new(AdmissionConfig { scene, ..config().with_key(Some(key())) }, &mut Counting::default()).unwrap();
     let asks = |scene: u64| joining(1).introduced(scene, Label::NONE).hello();
     assert_eq!(door.handle_datagram(at(0), address(1), &asks(7)), Admission::Refused(Refusal::OtherScene));
     assert_eq!(door.other_scene(), Some(OtherScene { place: SEAT, from: address(1), theirs: 7, ours: scene }));

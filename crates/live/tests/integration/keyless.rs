@@ -1,6 +1,7 @@
 //! Sessions without a key: the first good sample takes a seat.
 
 use cohaptic_live::AdmissionControl;
+use cohaptic_live::handshake::Taken;
 use cohaptic_live::{Admission, AdmissionConfig, AdmissionConfigError, Limits, MAX_DATAGRAM, Place, Refusal, Seat};
 use cohaptic_peer::{State, wire};
 use std::time::Duration;
@@ -29,6 +30,9 @@ fn a_present_peer_keeps_its_seat_and_a_silent_one_loses_it() {
     let mut door = keyless_door();
     admitted(door.handle_datagram(at(0), address(1), &sample(1, 500)));
     assert_eq!(door.handle_datagram(at(99), address(2), &sample(1, 0)), Admission::Refused(Refusal::SeatTaken));
+    let notice = door.notice(&sample(1, 0)).unwrap();
+    assert!(Taken { session: SESSION, place: SEAT, seal: None }.is(notice.bytes()) && notice.bytes().len() == 24);
+    assert!((door.notice(&sample(0, 0)), door.notice(&[0; 64])) == (None, None), "no seat, and no sample");
     // A refused sample does not count as heard: at 100 ms the first program is gone.
     assert!(!door.seat(at(100), SEAT).unwrap().present);
     let (joined, passed) = admitted(door.handle_datagram(at(100), address(2), &sample(1, 3)));

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use cohaptic_live::client::Joining;
-use cohaptic_live::handshake::Welcome;
+use cohaptic_live::handshake::{Taken, Welcome};
 use cohaptic_live::{MAX_DATAGRAM, Place, SessionKey};
 use cohaptic_peer::{State, wire};
 
@@ -57,4 +57,11 @@ fn the_code_makes_the_bytes_of_the_page() {
     let len = joined.seal(&sample(1, 5, 40, 0.025, -1.5), &mut out).unwrap();
     assert_eq!(out[..len], bytes("to the session"));
     assert_eq!(joined.open(&bytes("to the peer")), Ok(&sample(0, 7, 56, -0.5, 0.125)[..]));
+
+    let taken = Taken { session: SESSION, place: Place(1), seal: Some((&key, counting(0x40))) };
+    assert_eq!(taken.encode().bytes(), bytes("taken"));
+    assert!(taken.is(&bytes("taken")));
+    let taken = Taken { seal: None, ..taken };
+    assert_eq!(taken.encode().bytes(), bytes("taken without a key"));
+    assert!(taken.is(&bytes("taken without a key")));
 }

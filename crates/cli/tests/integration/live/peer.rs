@@ -123,7 +123,7 @@ fn talk(socket: &UdpSocket, mut client: Client, (speaks, ends, account, position
                     let received = Received { at: Wall::now(), sender: sample.sender, sequence: sample.sequence };
                     account.lock().unwrap().received.push(received);
                 }
-                Heard::Welcome | Heard::Ignored => {}
+                Heard::Welcome | Heard::Taken | Heard::Ignored => {}
             }
         }
     }
