@@ -94,12 +94,12 @@ pub enum Found {
     Nothing,
     /// The program fails over ideal links too, so that the network is not the cause.
     Elsewhere,
-    /// Smallest set of lost packets with which the program fails, and the result of as many further trials as [`Search::runs`]. Without a lost packet the
-    /// program fails by what the links do besides, such as their delay.
+    /// Smallest set of lost packets with a failing program, and the result of as many further trials as [`Search::runs`]. Without a lost packet the program
+    /// fails by other effects of the links, such as their delay.
     Case(Case, Count),
 }
 
-/// Sets of lost packets of failed seeds that are tried until one fails in each trial.
+/// Largest number of sets of lost packets, from failed seeds, to try until a set fails in each trial.
 const MOST_STARTS: usize = 8;
 
 impl Search {
@@ -154,7 +154,7 @@ impl Search {
             }
             counted.push((case, count));
         }
-        // Few packets are quickly reduced. Of as many packets those with low numbers are the surest, because little has happened before.
+        // Few packets are quickly reduced. Among sets of equal size, packets with low numbers exist in most trials, because little has happened before.
         failed.sort_by_key(|case| (case.lost.len(), case.lost.iter().map(|packet| packet.number).max()));
         for case in failed.into_iter().take(MOST_STARTS) {
             let count = self.count(&case, run, hear)?;

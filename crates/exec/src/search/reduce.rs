@@ -4,12 +4,12 @@ use std::collections::BTreeSet;
 
 use crate::lost::{LostPacket, LostPackets};
 
-/// Sets that are tried at most, so that a reduction ends within minutes.
+/// Largest number of tried sets, so that a reduction ends within minutes.
 const MOST_TRIED: usize = 200;
-/// Low numbers that are tried in the place of a packet's number, from 0.
+/// Number of low numbers, from 0, tried in the place of a packet's number.
 const LOW_NUMBERS: u64 = 16;
 
-/// Returns the smallest set that was found with which the program fails: `start`, or a set with fewer packets or lower numbers.
+/// Returns the smallest found set with a failing program: `start`, or a set with fewer packets or lower numbers.
 ///
 /// # Errors
 ///
@@ -45,8 +45,8 @@ fn candidates(of: &LostPackets) -> impl Iterator<Item = LostPackets> + '_ {
         .chain(all.into_iter().flat_map(move |packet| lowered(of, packet)))
 }
 
-/// Returns the sets of one packet with a low number, on the links of the set. Most failures need one packet, and these are few trials. A set of one packet has
-/// no such candidates: lower numbers are tried for every set.
+/// Returns the sets of one packet with a low number, on the links of the set. Most failures need one packet, and few trials find that packet. A set of one
+/// packet has no such candidates: lower numbers are tried for every set.
 fn single(of: &LostPackets) -> impl Iterator<Item = LostPackets> + '_ {
     let links = of.by_link();
     let numbers = 0..if of.len() > 1 { LOW_NUMBERS } else { 0 };
@@ -69,15 +69,16 @@ fn without_parts(all: Vec<LostPacket>) -> impl Iterator<Item = LostPackets> {
     })
 }
 
-/// Returns the set without a packet, with the next number below for later packets of its link: a packet that is not lost is not sent again, so that all that
-/// follows has lower numbers.
+/// Returns the set without a packet, with the next number below for later packets of its link: a delivered packet is not sent again, so that all
+/// later packets have lower numbers.
 fn renumbered(of: &LostPackets, gone: LostPacket) -> LostPackets {
     let lower =
         |packet: LostPacket| if packet.is_beside(&gone) && packet > gone { LostPacket { number: packet.number - 1, ..packet } } else { packet };
     of.iter().filter(|packet| *packet != gone).map(lower).collect()
 }
 
-/// Returns the sets with lower numbers for a packet, from 0: little has happened before a packet with a low number, so that its loss is the surest.
+/// Returns the sets with lower numbers for a packet, from 0: little has happened before a packet with a low number, so that the packet exists in
+/// most trials.
 fn lowered(of: &LostPackets, packet: LostPacket) -> impl Iterator<Item = LostPackets> + '_ {
     let lower = (0..packet.number.min(LOW_NUMBERS)).map(move |number| LostPacket { number, ..packet });
     lower.filter(|lower| !of.contains(lower)).map(move |lower| of.iter().filter(|other| *other != packet).chain([lower]).collect())

@@ -16,7 +16,7 @@ use crate::emulation::Stop;
 use crate::host::{Failed, Host, Output};
 use crate::signals;
 
-/// Time that commands have after SIGTERM until they are killed.
+/// Time from SIGTERM until the remaining commands are killed.
 const TO_END: Duration = Duration::from_secs(5);
 
 /// State of a command.
@@ -122,8 +122,8 @@ impl<'a> Watch<'a> {
             self.clock.block(Some(self.clock.now().saturating_add(signals::GROUP)), &[])?;
             self.tell_all(got.signal);
         }
-        // A command that waits has no process for the signal. Its host ends as if the signal had ended the command, so that no command starts after Ctrl-C, and
-        // the status of the run does not say that a command has succeeded which never ran.
+        // A waiting command has no process for the signal. The host ends as if the signal had ended the command: no command starts after Ctrl-C, and the status
+        // of the run counts no success of a command without a run.
         for place in 0..self.states.len() {
             if self.states[place] == State::Waits {
                 self.end(place, signals::status(got.signal));
@@ -154,8 +154,7 @@ impl<'a> Watch<'a> {
                     Some((Told::Failed(status, why), _)) => return Err(named(self.plan, plan, Failed { status, why })),
                     // A run that is ending needs no report any more.
                     None if self.kill_at.is_some() => self.hosts[place] = None,
-                    // Before the start process 1 reports nothing, so that something has killed it: the command counts as killed too, and not as one that has
-                    // succeeded.
+                    // Process 1 reports nothing before the start, so that process 1 was killed. The command counts as killed, too, and not as successful.
                     None if self.states[place] == State::Waits => self.end(place, signals::status(Signal::SIGKILL)),
                     None => return Err(named(self.plan, plan, Failed::own("the process inside has ended without a word".to_owned()))),
                 }
