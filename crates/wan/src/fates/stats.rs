@@ -33,6 +33,12 @@ impl Flow {
         self.delay_nanos += u128::from(at.as_nanos() - entered.as_nanos());
     }
 
+    /// Counts `packets` packets with the instants of [`Flow::deliver`].
+    pub(crate) fn deliver_train(&mut self, packets: u64, entered: Instant, at: Instant) {
+        self.delivered += packets;
+        self.delay_nanos += u128::from(packets) * u128::from(at.as_nanos() - entered.as_nanos());
+    }
+
     /// Counts a packet like [`Flow::deliver`] if the packet leaves the far end at or before `until`.
     #[inline(always)]
     pub(crate) fn deliver_by(&mut self, until: Instant, entered: Instant, at: Instant) {

@@ -191,6 +191,26 @@ impl<P, T: Clone> Line<P, T> {
         self.flow.deliver(entered, at);
     }
 
+    /// Returns whether a constant delay above zero is all that the line does to packets.
+    pub(crate) const fn is_constant(&self) -> bool {
+        matches!(self.pipeline, Pipeline::Constant(1.., _))
+    }
+
+    /// Takes `packets` packets at `now`, and returns the arrival of all of them. The line must be [constant](Line::is_constant).
+    #[inline]
+    pub(crate) fn offer_train(&mut self, now: Instant, packets: u32) -> Option<Instant> {
+        let Outcome::Arrives(at) = self.offer(now, None) else { return None };
+        // `offer` has counted the first packet.
+        self.flow.offered += u64::from(packets.saturating_sub(1));
+        Some(at)
+    }
+
+    /// Counts the arrival of further packets of a train, with the instants of [`Line::deliver`].
+    #[cold]
+    pub(crate) fn deliver_further(&mut self, packets: u64, entered: Instant, at: Instant) {
+        self.flow.deliver_train(packets, entered, at);
+    }
+
     /// Returns the counters touched by every packet, for an owner that counts arrivals itself.
     pub(crate) const fn flow(&mut self) -> &mut Flow {
         &mut self.flow

@@ -239,7 +239,7 @@ impl<P: Clone> Network<P> {
         self
     }
 
-    /// Takes a packet between two nodes at `now`. A plain size means a packet without ECN; a size above 8,388,607 bytes counts as 8,388,607 bytes.
+    /// Takes a packet between two nodes at `now`. A plain size means a packet without ECN; a size above 4,194,303 bytes counts as 4,194,303 bytes.
     ///
     /// # Errors
     ///
@@ -292,6 +292,33 @@ impl<P: Clone> Network<P> {
                 Ok(None)
             }
         }
+    }
+
+    /// Takes `packets` packets between two nodes at `now` as one train: the packets travel as one event with one payload, are counted one by one, and have
+    /// successive sequence numbers. The event has the number of the first packet, and the number of packets as its size.
+    ///
+    /// The train arrives when and where its packets would arrive: packets that enter a link of constant delay at one instant are adjacent among all events. A
+    /// train is taken only over such a link, with a delay above zero, in a network without access lines, filters, and links with more than delay, loss and
+    /// order.
+    ///
+    /// # Errors
+    ///
+    /// The payload, if the network takes no train on the path at present, if `now` is before an earlier call's instant, or if `packets` is not from 1 to
+    /// 4,194,303. No packet is taken then, and the packets can be handed in one by one.
+    pub fn handle_train(&mut self, now: Instant, path: Path, packets: u32, payload: P) -> Result<Instant, P> {
+        let Ok(link) = self.existing_link(path) else { return Err(payload) };
+        let place = self.place(path, link);
+        // Asked after the search for the link: a link that is made on demand may bring inner events.
+        let may = !self.has_inner_events && !self.has_filters && self.lines.links[place].is_constant();
+        if !may || !(1..=SizeAndMarks::MOST).contains(&packets) || check_time(&mut self.now, now).is_err() {
+            return Err(payload);
+        }
+        let line = &mut self.lines.links[place];
+        let sequence = line.offered();
+        let Some(at) = line.offer_train(now, packets) else { return Err(payload) };
+        let packet = InNetwork { sequence, offered: now, entered: now, path, size: SizeAndMarks::of_train(packets), payload };
+        self.traffic.schedule(at, LineId::Link(link), packet);
+        Ok(at)
     }
 
     /// Takes a packet in a network with access lines, engines or filters.
@@ -401,7 +428,11 @@ impl<P: Clone> Network<P> {
         let Self { now, traffic, lines, .. } = self;
         // Without inner events, no engine is woken, no packet has passed another line before its link, and no packet is damaged.
         let Pending { at, sequence, offered, entered, turn, path, size, payload } = traffic.pop_due(*now)?;
-        lines.link_mut(turn.link()).deliver(entered, at);
+        let line = lines.link_mut(turn.link());
+        if size.has(SizeAndMarks::TRAIN) {
+            line.deliver_further(size.further_packets(), entered, at);
+        }
+        line.deliver(entered, at);
         payload.map(|payload| {
             take(InNetwork { sequence, offered, entered, path, size, payload }.event(LineId::Link(turn.link()), at, Fate::Delivered(at), None))
         })

@@ -85,6 +85,9 @@ impl<P: Clone> Network<P> {
             return self.traffic.event(line, packet, at, Fate::Dropped(DropCause::Checksum));
         }
         last.deliver(packet.entered, at);
+        if packet.size.has(SizeAndMarks::TRAIN) {
+            last.deliver_further(packet.size.further_packets(), packet.entered, at);
+        }
         self.traffic.event(line, packet, at, Fate::Delivered(at))
     }
 

@@ -34,8 +34,9 @@ impl<P> InNetwork<P> {
     }
 }
 
-/// Size of a packet in bytes (upper 23 bits), its ECN codepoint (bits 7 and 8), its flags (bits 4 to 6), its copy bits (bits 0 to 2, see
-/// [`LineId::copy_bit`]). Bit 3 is always set: the number is never zero, so an `Option` of a type with this field needs no extra space.
+/// Size of a packet in bytes (upper 22 bits), its ECN codepoint (bits 7 and 8), its flags (bits 4 to 6 and 9), its copy bits (bits 0 to 2, see
+/// [`LineId::copy_bit`]). Bit 3 is always set: the number is never zero, so an `Option` of a type with this field needs no extra space. A train has the number
+/// of its packets in place of a size.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct SizeAndMarks(NonZeroU32);
 
@@ -45,15 +46,30 @@ impl SizeAndMarks {
     pub(super) const MARKED: u32 = 1 << 4;
     pub(super) const DAMAGED: u32 = 1 << 5;
     pub(super) const DISCARDED_ON_ARRIVAL: u32 = 1 << 6;
+    /// Several packets that travel as one event.
+    pub(super) const TRAIN: u32 = 1 << 9;
+    /// Greatest size of a packet \[byte\], and greatest number of packets of a train.
+    pub(super) const MOST: u32 = (1 << 22) - 1;
 
     pub(super) fn new(info: PacketInfo) -> Self {
-        // Sizes above 23 bits saturate, so the shift below loses no bit.
-        let size = u32::try_from(info.size.get().min((1 << 23) - 1)).unwrap_or(u32::MAX);
-        Self(Self::NOTHING.0 | size << 9 | u32::from(info.ecn.bits()) << 7)
+        // Larger sizes saturate, so the shift below loses no bit.
+        let size = u32::try_from(info.size.get()).unwrap_or(u32::MAX).min(Self::MOST);
+        Self(Self::NOTHING.0 | size << 10 | u32::from(info.ecn.bits()) << 7)
+    }
+
+    /// Returns the mark of a train of `packets` packets, at most [`SizeAndMarks::MOST`].
+    pub(super) fn of_train(packets: u32) -> Self {
+        Self(Self::NOTHING.0 | packets.min(Self::MOST) << 10 | Self::TRAIN)
+    }
+
+    /// Returns the number of packets in a train beside the first packet; 0 for a single packet.
+    #[inline(always)]
+    pub(super) fn further_packets(self) -> u64 {
+        if self.has(Self::TRAIN) { u64::from(self.0.get() >> 10).saturating_sub(1) } else { 0 }
     }
 
     pub(super) fn size(self) -> Bytes {
-        Bytes::new((self.0.get() >> 9).into())
+        Bytes::new((self.0.get() >> 10).into())
     }
 
     pub(super) fn info(self) -> PacketInfo {
@@ -176,14 +192,14 @@ impl<P> Event for Pending<P> {
 mod tests {
     use super::*;
 
-    /// Sizes from 2²³ on count as 2²³ − 1. Flags change neither the size nor the codepoint.
+    /// Sizes from 2²² on count as 2²² − 1. Flags change neither the size nor the codepoint.
     #[test]
     fn sizes_and_codepoints_come_back() {
-        for (size, expected) in [(0, 0), (1500, 1500), ((1 << 23) - 1, (1 << 23) - 1), (1 << 23, (1 << 23) - 1), (u64::MAX, (1 << 23) - 1)] {
+        for (size, expected) in [(0, 0), (1500, 1500), ((1 << 22) - 1, (1 << 22) - 1), (1 << 22, (1 << 22) - 1), (u64::MAX, (1 << 22) - 1)] {
             for ecn in [Ecn::NotCapable, Ecn::Capable0, Ecn::Capable1, Ecn::Congestion] {
                 let packet = SizeAndMarks::new(PacketInfo { size: Bytes::new(size), ecn });
-                let flags = [SizeAndMarks::MARKED, SizeAndMarks::DAMAGED, SizeAndMarks::DISCARDED_ON_ARRIVAL];
-                assert!(flags.iter().all(|flag| !packet.has(*flag)) && packet.copy() == 0);
+                let flags = flags_of_packets();
+                assert!(flags.iter().all(|flag| !packet.has(*flag)) && (packet.copy(), packet.further_packets()) == (0, 0));
                 let flagged = flags.iter().fold(packet, |packet, flag| packet.with(*flag, true));
                 for packet in [packet, flagged] {
                     assert_eq!(packet.info(), PacketInfo { size: Bytes::new(expected), ecn }, "{size}");
@@ -191,5 +207,14 @@ mod tests {
                 assert_eq!(flags.iter().fold(flagged, |packet, flag| packet.with(*flag, false)), packet);
             }
         }
+        for packets in [1, 2, SizeAndMarks::MOST] {
+            let train = SizeAndMarks::of_train(packets);
+            assert_eq!((train.further_packets(), train.copy()), (u64::from(packets) - 1, 0));
+            assert!(flags_of_packets().iter().all(|flag| !train.has(*flag)));
+        }
+    }
+
+    fn flags_of_packets() -> [u32; 3] {
+        [SizeAndMarks::MARKED, SizeAndMarks::DAMAGED, SizeAndMarks::DISCARDED_ON_ARRIVAL]
     }
 }

@@ -30,3 +30,4 @@ mod queue_laws;
 mod random_links;
 mod relay;
 mod some_links;
+mod trains;
