@@ -47,6 +47,7 @@ mod connection;
 mod error;
 mod info;
 mod memory;
+mod pace;
 mod ranges;
 mod rtt;
 mod scoreboard;

@@ -192,7 +192,7 @@ impl Tuning {
         }
         free = free.min(self.threshold);
         let window = if unit > 1 {
-            free.next_multiple_of(unit)
+            whole_units(free, unit)
         } else if offered + full <= free || offered > free {
             free - free % full.max(1)
         } else {
@@ -200,6 +200,11 @@ impl Tuning {
         };
         (window, is_little)
     }
+}
+
+/// Returns `octets` rounded up to a multiple of `unit`, a power of two. Each segment offers a window, and a mask takes less time than a division.
+pub(crate) const fn whole_units(octets: u64, unit: u64) -> u64 {
+    (octets + (unit - 1)) & !(unit - 1)
 }
 
 #[cfg(test)]

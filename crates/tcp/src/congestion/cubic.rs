@@ -170,6 +170,7 @@ fn cube_root(number: u128) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pace::Pace;
 
     /// RFC 9438, calculated by hand: `W_max` = 100, β = 0.7, C = 0.4.
     #[test]
@@ -192,7 +193,7 @@ mod tests {
         cubic.step(Instant::ZERO, 16, 1);
         // Returns whether one of ten acknowledgements of a round from the second `second` on ends slow start.
         let ends = |cubic: &mut Cubic, second: u64, latest: u64| {
-            let sample = RoundTrip { latest: Duration::from_millis(latest), una: second * 10, next: second * 10 + 5, burst: Duration::ZERO };
+            let sample = RoundTrip { latest: Duration::from_millis(latest), una: second * 10, next: second * 10 + 5, pace: Pace::UNBOUNDED };
             (0..10).any(|k| cubic.ends_slow_start(Instant::ZERO + Duration::from_millis(second * 1000 + k * 3), Some(16), sample))
         };
         assert!(!ends(&mut cubic, 0, 50) && cubic.least_rtt.is_zero());
@@ -213,7 +214,7 @@ mod tests {
         // 70 segments, R = 100 ms, so that Reno is slower; the window is ahead by a round trip.
         let mut congestion = super::super::Congestion::new(&crate::TcpConfig::default());
         (congestion.window, congestion.is_limiting) = (100, true);
-        congestion.sample(Instant::ZERO, RoundTrip { latest: Duration::from_millis(100), una: 0, next: 0, burst: Duration::ZERO });
+        congestion.sample(Instant::ZERO, RoundTrip { latest: Duration::from_millis(100), una: 0, next: 0, pace: Pace::UNBOUNDED });
         congestion.threshold = congestion.reduced();
         congestion.window = congestion.threshold;
         let rtt = Duration::from_millis(100);

@@ -5,6 +5,7 @@ use core::time::Duration;
 
 use cohaptic_units::Instant;
 
+use crate::pace::Pace;
 use crate::sequence::Position;
 
 /// Least window at which slow start may be left \[segments\] (`hystart_low_window`).
@@ -51,8 +52,8 @@ pub(crate) struct RoundTrip {
     pub(crate) una: Position,
     /// First position that was never sent.
     pub(crate) next: Position,
-    /// Time by which acknowledgements of one burst may be apart.
-    pub(crate) burst: Duration,
+    /// Rate of the sender, which tells the time by which acknowledgements of one burst may be apart.
+    pub(crate) pace: Pace,
 }
 
 impl HyStart {
@@ -69,7 +70,9 @@ impl HyStart {
         if now.saturating_duration_since(round.last) <= IN_TRAIN {
             round.last = now;
             // A train that is as long as half a round trip fills the path in one direction.
-            self.found |= now.saturating_duration_since(round.begin) > (least + sample.burst) / 2;
+            let length = now.saturating_duration_since(round.begin);
+            // The margin takes divisions, and most trains are far shorter.
+            self.found |= length > least / 2 && length > (least + sample.pace.margin()) / 2;
         }
         round.least = round.least.min(sample.latest);
         if round.samples < SAMPLES {
@@ -91,7 +94,7 @@ mod tests {
     /// least round trip.
     fn ends_after(window: u32, count: u64, apart: Duration, latest: Duration, least: Duration) -> Option<u64> {
         let mut hystart = HyStart::default();
-        let sample = RoundTrip { latest, una: 1, next: 1_000_000, burst: Duration::from_millis(1) };
+        let sample = RoundTrip { latest, una: 1, next: 1_000_000, pace: Pace::new(0, 100, 1) };
         let mut ends = |k: &u64| hystart.ends(Instant::ZERO + apart * u32::try_from(*k).unwrap(), window, least, sample);
         let index = (0..count).find(&mut ends);
         // Slow start ends once: the search does not begin anew before a timeout.

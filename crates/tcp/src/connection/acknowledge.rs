@@ -1,10 +1,7 @@
 //! Arrival of an acknowledgement: the peer's window, the segments that have arrived, the round trip, and then losses and the congestion window.
 
-use core::time::Duration;
-
 use cohaptic_units::Instant;
 
-use super::burst::LONGEST_BURST;
 use super::{Connection, Timer};
 use crate::congestion::RoundTrip;
 use crate::info::CaState;
@@ -76,9 +73,8 @@ impl Connection {
             self.round_trips.sample(now, round_trip);
         }
         if let Some(latest) = ack.news.latest_round_trip(now) {
-            let burst = Duration::from_nanos((4 * LONGEST_BURST).saturating_mul(1_000_000_000) / self.pacing_rate().unwrap_or(u64::MAX).max(1));
-            let (una, next) = (self.send.una, self.send.next);
-            self.congestion.sample(now, RoundTrip { latest, una, next, burst: burst.min(Duration::from_millis(1)) });
+            let (una, next, pace) = (self.send.una, self.send.next, self.pace());
+            self.congestion.sample(now, RoundTrip { latest, una, next, pace });
         }
         if has_advanced {
             (self.counters.retries, self.counters.stalled_since) = (0, None);

@@ -8,6 +8,15 @@ use crate::info::State;
 use crate::segment::{Ecn, Flags, Options, Payload, SackBlocks, Segment, TIMESTAMPS_LENGTH};
 use crate::sequence::{Position, on_wire};
 
+/// Content of a segment: positions from `start` to `end` (exclusive), possibly with the FIN, and flags beside those that follow from the connection.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Content {
+    pub(super) start: Position,
+    pub(super) end: Position,
+    pub(super) flags: Flags,
+    pub(super) ecn: Ecn,
+}
+
 impl Connection {
     /// Returns this end's SYN. In SYN-RECEIVED, the SYN has an ACK.
     pub(super) fn build_syn(&self, now: Instant) -> Segment<'static> {
@@ -66,24 +75,35 @@ impl Connection {
 
     /// Returns a reset at the next position, with the window and the timestamps of other segments, as Linux sends.
     pub(super) fn build_reset(&mut self, now: Instant) -> Segment<'static> {
-        let segment = self.build(now, self.send.next, self.send.next);
+        let segment = self.build_acknowledgement(now);
         Segment { flags: Flags::RST | Flags::ACK, ..segment }
     }
 
-    /// Returns a segment with the positions from `start` to `end` (exclusive), possibly with the FIN. The segment acknowledges all octets that have arrived in
-    /// order, so that no further acknowledgement is due afterwards.
-    pub(super) fn build(&mut self, now: Instant, start: Position, end: Position) -> Segment<'static> {
-        self.build_with(now, start, end, (Flags::NONE, self.codepoint()))
+    /// Returns an acknowledgement without data at the next position.
+    pub(super) fn build_acknowledgement(&mut self, now: Instant) -> Segment<'static> {
+        self.build(now, self.acknowledgement())
     }
 
-    /// Like [`build`](Self::build), with more flags and a codepoint. Both are given beforehand because a segment is large, and a change afterwards would move
-    /// the segment once more.
-    pub(super) fn build_with(&mut self, now: Instant, start: Position, end: Position, (more, ecn): (Flags, Ecn)) -> Segment<'static> {
+    /// Returns the content of an acknowledgement without data at the next position.
+    pub(super) const fn acknowledgement(&self) -> Content {
+        Content { start: self.send.next, end: self.send.next, flags: Flags::NONE, ecn: self.codepoint() }
+    }
+
+    /// Returns a segment with this content.
+    pub(super) fn build(&mut self, now: Instant, content: Content) -> Segment<'static> {
+        let mut segment = self.empty(Flags::NONE);
+        self.write_segment(now, content, &mut segment);
+        segment
+    }
+
+    /// Writes a segment with this content over `segment`. The segment acknowledges all octets that have arrived in order, so that no further acknowledgement is
+    /// due afterwards.
+    pub(super) fn write_segment(&mut self, now: Instant, Content { start, end, flags, ecn }: Content, segment: &mut Segment<'static>) {
         // The FIN has the position after the last octet, so a position beyond the buffer is the FIN.
         let data_end = end.min(self.send.buffer.end()).max(start);
         let payload = self.send.buffer.slice(start, data_end);
         let has_fin = end > data_end;
-        let flags = (Flags::ACK | more)
+        segment.flags = (Flags::ACK | flags)
             .with_if(Flags::FIN, has_fin)
             .with_if(Flags::ECE, self.send.tells_mark)
             .with_if(Flags::CWR, self.send.tells_reduction && !payload.is_empty());
@@ -91,10 +111,14 @@ impl Connection {
         if !payload.is_empty() {
             self.send.tells_reduction = false;
         }
-        let options = self.options(now, payload.len());
-        let window = self.offer_window();
+        segment.options = self.options(now, payload.len());
+        segment.window = self.offer_window();
         self.has_acknowledged();
-        Segment { sequence: on_wire(start), window, options, ecn, payload: payload.into(), ..self.empty(flags) }
+        // Field by field, because a segment that is built elsewhere and moved takes longer than the rest of this function.
+        (segment.source, segment.destination) = (self.local, self.remote);
+        (segment.sequence, segment.acknowledgement) = (on_wire(start), on_wire(self.receive.next));
+        (segment.ecn, segment.ttl) = (ecn, self.config.ttl);
+        segment.payload = payload.into();
     }
 
     /// Returns timestamps, and as many selective acknowledgements as fit beside `payload` octets of data.

@@ -4,10 +4,8 @@
 use cohaptic_units::Instant;
 
 use super::Connection;
+use crate::pace::{LONGEST_BURST, Pace};
 use crate::sequence::Position;
-
-/// Most octets of a burst: 64 KiB less the room that Linux keeps for headers (`sk_gso_max_size`).
-pub(crate) const LONGEST_BURST: u64 = 65_536 - 257;
 
 /// Burst that is leaving, of new or of lost segments.
 #[derive(Clone, Debug)]
@@ -46,29 +44,33 @@ impl Burst {
 }
 
 impl Connection {
-    /// Returns the rate at which Linux would pace the sender \[byte/s\] (`tcp_update_pacing_rate`), or `None` before the first round trip. This crate paces
-    /// nothing; the rate only sets the length of bursts, and a margin of `HyStart`.
-    pub(super) fn pacing_rate(&self) -> Option<u64> {
-        let srtt = u128::from(self.round_trips.srtt_nanos()?.max(1));
+    /// Returns the rate at which Linux would pace the sender (`tcp_update_pacing_rate`).
+    pub(super) fn pace(&self) -> Pace {
+        let Some(srtt) = self.round_trips.srtt_nanos() else { return Pace::UNBOUNDED };
         let percent = if self.congestion.window < self.congestion.threshold / 2 { 200 } else { 120 };
-        let flight = u128::from(self.congestion.window.max(self.send.board.packets_out())) * self.send.mss as u128;
-        Some(u64::try_from(flight * percent * 10_000_000 / srtt).unwrap_or(u64::MAX))
+        Pace::new(u64::from(self.congestion.window.max(self.send.board.packets_out())) * self.send.mss as u64, percent, srtt)
     }
 
-    /// Returns the most segments of a burst: what the rate brings in about a millisecond, at least two (`tcp_tso_autosize`).
-    fn longest_burst(&self, mss: u64) -> u32 {
+    /// Returns the number of segments of a burst, at most `most`: what the rate brings in about a millisecond, but at least two (`tcp_tso_autosize`).
+    fn longest_burst(&self, most: u32) -> u32 {
+        let mss = self.segment_size().max(1) as u64;
+        let wanted = u64::from(most) * mss;
         // On a short path bursts may be longer. The shift is the least round trip in units of 512 µs.
         let near = self.round_trips.least().map_or(0, |least| least.as_micros() >> 9);
         let near = u32::try_from(near).ok().and_then(|shift| LONGEST_BURST.checked_shr(shift)).unwrap_or(0);
-        let by_rate = (self.pacing_rate().unwrap_or(u64::MAX) >> 10).saturating_add(near).min(LONGEST_BURST) / mss;
-        u32::try_from(by_rate.max(2)).unwrap_or(u32::MAX)
+        // Most bursts are short, and need neither the rate nor a quotient.
+        if most <= 2 || wanted <= near {
+            return most;
+        }
+        let octets = (self.pace().rate() >> 10).saturating_add(near).min(LONGEST_BURST);
+        whole(octets, mss, most).max(2)
     }
 
     /// Returns the most segments of the burst that begins now: what the rate and the congestion window allow, at most half of the congestion window.
     fn quota(&self) -> u32 {
         let window = self.congestion.window;
         let quota = window.saturating_sub(self.send.board.in_flight()).min((window / 2).max(1));
-        quota.min(self.longest_burst(self.segment_size().max(1) as u64)).max(1)
+        self.longest_burst(quota).max(1)
     }
 
     /// Returns the number of segments in the burst that begins now: at most `quota`, and what the peer's window and the data allow.
@@ -77,11 +79,12 @@ impl Connection {
         let (unsent, open) = (self.send.buffer.end().saturating_sub(self.send.next), self.send.window_end().saturating_sub(self.send.next));
         // A last segment below the full size belongs to the burst if neither the window nor Nagle's algorithm holds it back.
         let takes_rest = unsent <= open && (self.config.nodelay || self.send.is_shut || self.send.small_end <= self.send.una);
-        let segments = if takes_rest { unsent.div_ceil(mss) } else { unsent.min(open) / mss };
+        // With the octets of all but one octet of a segment more, the last segment counts as a whole one.
+        let octets = if takes_rest { unsent.saturating_add(mss - 1) } else { unsent.min(open) };
         // The octets that leave while the program writes are one buffer, of at most half of the peer's largest window (`tcp_bound_to_half_wnd`). Later a
         // buffer takes octets of the next one (`tcp_grow_skb`).
-        let most = if self.send.pushes.is_writing { self.half_window() / mss } else { u64::MAX };
-        u32::try_from(segments.min(most)).unwrap_or(u32::MAX).min(quota).max(1)
+        let most = if self.send.pushes.is_writing { self.half_window() } else { u64::MAX };
+        whole(octets.min(most), mss, quota).max(1)
     }
 
     /// Notes that the new segment from `start` to `end` leaves at `now`. Returns whether the segment is the last of a burst, and whether the burst has several
@@ -103,10 +106,14 @@ impl Connection {
     pub(super) fn ends_repetition(&mut self, now: Instant, start: Position, end: Position) -> bool {
         if self.send.repetition.is_over(now, start) {
             let board = &self.send.board;
-            let quota = self.congestion.window.saturating_sub(board.in_flight());
-            let most = quota.min(self.longest_burst(self.segment_size().max(1) as u64));
+            let most = self.longest_burst(self.congestion.window.saturating_sub(board.in_flight()));
             self.send.repetition = Burst::begin(now, start, board.lost_in_burst(start, self.send.window_end(), most).max(1));
         }
         self.send.repetition.takes(end) && self.send.repetition.has_several
     }
+}
+
+/// Returns the number of whole segments of `mss` octets in `octets` octets, at most `most`. Divides only if there are fewer.
+fn whole(octets: u64, mss: u64, most: u32) -> u32 {
+    if octets >= u64::from(most).saturating_mul(mss) { most } else { u32::try_from(octets / mss).unwrap_or(most) }
 }

@@ -10,11 +10,10 @@ use crate::tuning::Tuning;
 
 impl Connection {
     /// Takes in the data and the FIN of a valid segment that begins at `start`.
-    pub(super) fn accept_data(&mut self, now: Instant, segment: &Segment<'_>, start: Position) {
-        let payload = &segment.payload;
+    pub(super) fn accept_data(&mut self, now: Instant, segment: &mut Segment<'_>, start: Position) {
         let has_fin = segment.flags.has(Flags::FIN);
-        let data_end = start + payload.len() as u64;
-        if payload.is_empty() && !has_fin {
+        let data_end = start + segment.payload.len() as u64;
+        if segment.payload.is_empty() && !has_fin {
             return;
         }
         if self.is_orphan && data_end > self.receive.next {
@@ -44,7 +43,7 @@ impl Connection {
                 self.receive.assembler.insert_fin(data_end);
             }
         }
-        self.accept_octets(now, start, end, payload);
+        self.accept_octets(now, start, end, core::mem::take(&mut segment.payload));
         if self.receive.fin == Some(self.receive.next) && !self.receive.is_ended {
             self.end_of_data(now);
         }
@@ -52,10 +51,12 @@ impl Connection {
     }
 
     /// Takes in the octets of `payload` from `start` to `end`, and notes which of them are duplicates. `payload` may be longer: the rest was cut off.
-    fn accept_octets(&mut self, now: Instant, start: Position, end: Position, payload: &Payload<'_>) {
+    fn accept_octets(&mut self, now: Instant, start: Position, end: Position, payload: Payload<'_>) {
         if start < self.receive.next {
             self.tell_duplicate(start, self.receive.next.min(end));
-        } else if let Some((low, high)) = self.receive.assembler.first_within(start, end) {
+        } else if self.receive.assembler.has_gaps()
+            && let Some((low, high)) = self.receive.assembler.first_within(start, end)
+        {
             // As in Linux, what the segment has in common with the first range is reported. There is one report for each acknowledgement.
             self.tell_duplicate(start.max(low), end.min(high));
         }
@@ -64,7 +65,7 @@ impl Connection {
         let count = usize::try_from(end.saturating_sub(start)).unwrap_or(0);
         let known = count < payload.len();
         if count > 0 {
-            self.receive.assembler.insert(&mut self.receive.next, start, payload.slice(0..count));
+            self.receive.assembler.insert(&mut self.receive.next, start, payload.into_first(count));
             self.learn_rhythm(now, count);
         }
         // If data was cut off, is out of order or fills a gap, the acknowledgement leaves at once (RFC 5681, section 4.2).
@@ -136,7 +137,7 @@ impl Connection {
         }
         // A delayed acknowledgement is due for segments of the state before. It leaves first, without the arriving segment.
         if self.receive.ack_at.is_some() {
-            let acknowledgement = self.build(now, self.send.next, self.send.next);
+            let acknowledgement = self.build_acknowledgement(now);
             self.replies.push_back(acknowledgement);
         }
         self.send.tells_mark = is_marked;
@@ -179,11 +180,10 @@ impl Connection {
     fn decide_acknowledgement(&mut self, now: Instant) {
         let unacked = usize::try_from(self.receive.next - self.receive.acked).unwrap_or(usize::MAX);
         // As in Linux, an acknowledgement that would offer less than before waits for the program to read.
-        let keeps_window = self.receive.tuning.is_none() || self.receive.assembler.unread() == 0 || self.free_window().0 >= self.receive.offered();
+        let keeps_window = || self.receive.tuning.is_none() || self.receive.assembler.unread() == 0 || self.free_window().0 >= self.receive.offered();
+        let is_due = (self.receive.quick > 0 && !self.receive.is_interactive) || (unacked > self.receive.segment && keeps_window());
         let receive = &mut self.receive;
-        if (unacked > receive.segment && keeps_window) || (receive.quick > 0 && !receive.is_interactive) {
-            receive.ack_now = true;
-        }
+        receive.ack_now |= is_due;
         if !receive.ack_now && unacked > 0 {
             // A deadline that is already set stays, so that the first unacknowledged octet waits no longer than the configuration allows.
             receive.ack_at.get_or_insert_with(|| now.saturating_add(self.config.delayed_ack));

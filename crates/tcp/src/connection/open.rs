@@ -177,7 +177,7 @@ impl Connection {
     }
 
     /// Handles a segment that arrives in SYN-SENT (RFC 9293, section 3.10.7.3).
-    pub(super) fn handle_in_syn_sent(&mut self, now: Instant, segment: &Segment<'_>) {
+    pub(super) fn handle_in_syn_sent(&mut self, now: Instant, segment: &mut Segment<'_>) {
         let has_ack = segment.flags.has(Flags::ACK);
         // An acknowledgement of anything but the SYN belongs to an older connection. This check comes first, so a reset of this kind has no effect.
         if has_ack && extend(segment.acknowledgement, self.send.una) != self.send.next {

@@ -4,7 +4,7 @@
 use alloc::collections::VecDeque;
 
 use super::Connection;
-use super::burst::LONGEST_BURST;
+use crate::pace::LONGEST_BURST;
 use crate::sequence::Position;
 
 /// Ends of marked buffers whose octets were not sent.

@@ -19,6 +19,12 @@ const TIMESTAMPS_COUNT: Duration = Duration::from_secs(24 * 86_400);
 impl Connection {
     /// Handles a segment that arrives at `now`. The owner has checked the addresses and ports of the segment.
     pub fn handle_segment(&mut self, now: Instant, segment: &Segment<'_>) {
+        self.take_segment(now, &mut segment.clone());
+    }
+
+    /// Handles a segment like [`handle_segment`](Self::handle_segment), but may take the data out of the segment, which then has no data. Saves an owner that
+    /// needs the segment no longer a further reference to memory that the data shares with the sender.
+    pub fn take_segment(&mut self, now: Instant, segment: &mut Segment<'_>) {
         match self.state {
             State::Closed => self.replies.extend(segment.refusal(self.config.ttl)),
             State::SynSent => self.handle_in_syn_sent(now, segment),
@@ -30,7 +36,7 @@ impl Connection {
     }
 
     /// Handles a segment after the peer's SYN has arrived.
-    fn handle_synchronised(&mut self, now: Instant, segment: &Segment<'_>) {
+    fn handle_synchronised(&mut self, now: Instant, segment: &mut Segment<'_>) {
         let start = extend(segment.sequence, self.receive.next);
         if self.answers_own_syn(segment, start) {
             self.receive.ack_now = true;

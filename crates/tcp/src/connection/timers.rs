@@ -101,7 +101,7 @@ impl Connection {
         // In whole nanoseconds, because every segment sets this timer, and sums of `Duration`s carry between seconds and nanoseconds.
         let mut wait = match self.round_trips.srtt_nanos() {
             // The peer may delay the acknowledgement of a single segment.
-            Some(srtt) => 2 * srtt + nanos(if board.packets_out() == 1 { self.config.least_variance.max(TWO_TICKS) } else { TWO_TICKS }),
+            Some(srtt) => 2 * srtt + if board.packets_out() == 1 { nanos(self.config.least_variance.max(TWO_TICKS)) } else { nanos(TWO_TICKS) },
             None => nanos(self.config.initial_timeout),
         };
         // The probe must not come later than the retransmission timer would.

@@ -2,41 +2,74 @@
 
 use cohaptic_units::Instant;
 
+use super::build::Content;
 use super::{Connection, Probe, Timer};
 use crate::info::CaState;
 use crate::scoreboard::Ending;
 use crate::segment::{Ecn, Flags, Segment};
-use crate::sequence::{Position, on_wire};
+use crate::sequence::Position;
+
+/// Next segment to send.
+#[derive(Clone, Copy, Debug)]
+enum Choice {
+    /// The first of the replies.
+    Reply,
+    /// A reset, which tells that this end has given the connection up.
+    Reset,
+    Segment(Content),
+}
 
 impl Connection {
     /// Returns the next segment to send at `now`, or `None` if no segment may leave at present.
     #[must_use]
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Segment<'static>> {
+        match self.choose(now)? {
+            Choice::Reply => self.replies.pop_front(),
+            Choice::Reset => Some(self.build_reset(now)),
+            Choice::Segment(content) => Some(self.build(now, content)),
+        }
+    }
+
+    /// Writes the next segment to send at `now` over `segment`, whose former content is of no importance. Returns `false` and writes nothing if no segment may
+    /// leave at present. A segment is large, and need not be moved so.
+    #[must_use]
+    pub fn poll_transmit_into(&mut self, now: Instant, segment: &mut Segment<'static>) -> bool {
+        match self.choose(now) {
+            None => return false,
+            Some(Choice::Reply) => self.replies.pop_front().into_iter().for_each(|reply| *segment = reply),
+            Some(Choice::Reset) => *segment = self.build_reset(now),
+            Some(Choice::Segment(content)) => self.write_segment(now, content, segment),
+        }
+        true
+    }
+
+    /// Chooses the next segment to send, and notes that the segment leaves.
+    fn choose(&mut self, now: Instant) -> Option<Choice> {
         self.follow_up_calls(now);
         // The order of the choices matters. Every segment after the replies acknowledges all data in order, so that a pure acknowledgement comes last. Lost
         // segments come before new data, because the peer's program waits for lost data.
-        if let Some(reply) = self.replies.pop_front() {
-            return Some(reply);
+        if !self.replies.is_empty() {
+            return Some(Choice::Reply);
         }
         if core::mem::take(&mut self.is_reset_due) {
-            return Some(self.build_reset(now));
+            return Some(Choice::Reset);
         }
         if self.state.is_synchronised() {
             if let Some(probe) = self.probe.take()
-                && let Some(segment) = self.forced(now, probe)
+                && let Some(content) = self.forced(now, probe)
             {
-                return Some(segment);
+                return Some(Choice::Segment(content));
             }
             if self.state.may_send() {
-                if let Some(segment) = self.lost_again(now) {
-                    return Some(segment);
+                if let Some(content) = self.lost_again(now) {
+                    return Some(Choice::Segment(content));
                 }
-                if let Some(segment) = self.new_data(now, false) {
-                    return Some(segment);
+                if let Some(content) = self.new_data(now, false) {
+                    return Some(Choice::Segment(content));
                 }
             }
             if self.receive.ack_now {
-                return Some(self.build(now, self.send.next, self.send.next));
+                return Some(Choice::Segment(self.acknowledgement()));
             }
         }
         self.send.pushes.is_writing = false;
@@ -44,7 +77,7 @@ impl Connection {
     }
 
     /// Sends the first lost segment again, if the congestion window and the peer's window have room.
-    fn lost_again(&mut self, now: Instant) -> Option<Segment<'static>> {
+    fn lost_again(&mut self, now: Instant) -> Option<Content> {
         let board = &self.send.board;
         let lost = board.next_lost()?;
         let (start, end, pushes) = (lost.start, lost.end, lost.ending.pushes);
@@ -64,17 +97,18 @@ impl Connection {
         Some(self.again(now, start, end, pushes || ends_burst))
     }
 
-    /// Returns an earlier segment once more, and counts the repetition for the undo.
-    fn again(&mut self, now: Instant, start: Position, end: Position, pushes: bool) -> Segment<'static> {
+    /// Returns the content of an earlier segment once more, and counts the repetition for the undo.
+    fn again(&mut self, now: Instant, start: Position, end: Position, pushes: bool) -> Content {
         self.send.last_data_at = now;
         self.counters.retransmissions += 1;
         self.recovery.again_at.get_or_insert(now);
         self.recovery.undo_left = Some(self.recovery.undo_left.unwrap_or(0) + 1);
-        self.build_with(now, start, end, (Flags::NONE.with_if(Flags::PSH, pushes), self.codepoint()))
+        Content { start, end, flags: Flags::NONE.with_if(Flags::PSH, pushes), ecn: self.codepoint() }
     }
 
     /// Returns the end of the next new segment, if the peer's window has room for a full segment or for all remaining data. A smaller part is not sent, so that
     /// no silly window arises (RFC 9293, section 3.8.6.2.1).
+    #[inline]
     fn next_end(&self) -> Option<Position> {
         let size = self.segment_size().saturating_sub(self.sack_length()).max(1) as u64;
         let data_end = self.send.buffer.end();
@@ -94,7 +128,8 @@ impl Connection {
     }
 
     /// Sends the next segment of new data, if the windows have room. With `is_probe`, the congestion window and Nagle's algorithm do not count.
-    fn new_data(&mut self, now: Instant, is_probe: bool) -> Option<Segment<'static>> {
+    #[inline]
+    fn new_data(&mut self, now: Instant, is_probe: bool) -> Option<Content> {
         if !self.send.has_new() {
             return None;
         }
@@ -122,7 +157,8 @@ impl Connection {
     }
 
     /// Sends the new segment that ends at `end`, notes it in the scoreboard, and sets the timers.
-    fn send_new(&mut self, now: Instant, end: Position) -> Segment<'static> {
+    #[inline]
+    fn send_new(&mut self, now: Instant, end: Position) -> Content {
         let start = self.send.next;
         let was_empty = self.send.board.is_empty();
         // New data soon after the arrival of data is an answer.
@@ -154,7 +190,7 @@ impl Connection {
         // With a scalable congestion control, every segment has a codepoint already.
         let codepoint = self.codepoint();
         let ecn = if self.send.has_ecn && has_data && !codepoint.is_capable() { Ecn::Capable0 } else { codepoint };
-        self.build_with(now, start, end, (flags, ecn))
+        Content { start, end, flags, ecn }
     }
 
     /// Sets the timer for a probe of the peer's window, unless a segment is on the way whose answer will tell the window.
@@ -164,34 +200,34 @@ impl Connection {
         }
     }
 
-    /// Returns the segment for `probe`, or `None` if there is neither new data nor an earlier segment to send again.
-    fn forced(&mut self, now: Instant, probe: Probe) -> Option<Segment<'static>> {
+    /// Returns the content of the segment for `probe`, or `None` if there is neither new data nor an earlier segment to send again.
+    fn forced(&mut self, now: Instant, probe: Probe) -> Option<Content> {
         match probe {
             // New data is the better probe, because new data must be sent anyway. Without new data, the last segment is repeated.
             Probe::Tail => {
-                let segment = self.new_data(now, true);
-                self.tail.is_again = segment.is_none();
-                let segment = segment.or_else(|| self.last_again(now));
-                self.tail.end = segment.is_some().then_some(self.send.next);
+                let content = self.new_data(now, true);
+                self.tail.is_again = content.is_none();
+                let content = content.or_else(|| self.last_again(now));
+                self.tail.end = content.is_some().then_some(self.send.next);
                 self.set_retransmission_timer(now, true);
-                segment
+                content
             }
             Probe::Window => {
                 let end = self.send.window_end().min(self.send.end()).min(self.send.next + self.segment_size() as u64);
                 if self.send.has_new() && self.send.next < end && self.state.may_send() {
                     (self.counters.probes, self.counters.probe_backoff) = (0, 0);
-                    let segment = self.send_new(now, end);
-                    return Some(Segment { flags: segment.flags | Flags::PSH, ..segment });
+                    let content = self.send_new(now, end);
+                    return Some(Content { flags: content.flags | Flags::PSH, ..content });
                 }
                 // A segment without data from below the peer's window carries nothing, but forces an answer.
-                let segment = self.build(now, self.send.next, self.send.next);
-                Some(Segment { sequence: on_wire(self.send.una - 1), ..segment })
+                let below = self.send.una - 1;
+                Some(Content { start: below, end: below, ..self.acknowledgement() })
             }
         }
     }
 
     /// Sends the last segment again as a probe. The estimate of the segments on the way does not change.
-    fn last_again(&mut self, now: Instant) -> Option<Segment<'static>> {
+    fn last_again(&mut self, now: Instant) -> Option<Content> {
         let last = self.send.board.last()?;
         let (start, end, pushes) = (last.start, last.end, last.ending.pushes);
         self.send.board.split_last();

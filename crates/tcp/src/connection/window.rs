@@ -3,7 +3,7 @@
 use super::Connection;
 use crate::config::TcpConfig;
 use crate::segment::TIMESTAMPS_LENGTH;
-use crate::tuning::Tuning;
+use crate::tuning::{Tuning, whole_units};
 
 impl Connection {
     /// Returns the most data per segment that this end accepts \[byte\].
@@ -23,7 +23,7 @@ impl Connection {
         }
         let window = free.max(current);
         // An unchanged window is rounded up to whole units, because rounding down would move its edge back.
-        let window = window.next_multiple_of(unit).min(most);
+        let window = whole_units(window, unit).min(most);
         self.receive.edge = self.receive.next + window;
         u16::try_from(window >> self.receive.scale).unwrap_or(u16::MAX)
     }

@@ -45,6 +45,9 @@ pub(crate) struct Ending {
 /// Instant and number of a transmission. The number orders transmissions of the same instant.
 pub(crate) type SentAt = (Instant, u64);
 
+/// Segments for which a scoreboard has memory at first.
+const FIRST: usize = 16;
+
 /// Segments from the first unacknowledged position to the last position sent.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Scoreboard {
@@ -101,6 +104,11 @@ impl Scoreboard {
     pub(crate) fn push(&mut self, start: Position, end: Position, at: Instant, ending: Ending) {
         self.transmissions += 1;
         let order = self.transmissions;
+        if self.queue.capacity() == 0 {
+            // A flight has mostly ten segments and more.
+            self.queue.reserve(FIRST);
+            self.by_time.reserve(FIRST);
+        }
         self.by_time.push_back(((at, order), start));
         self.queue.push_back(Sent { start, end, at, order, sacked: false, lost: false, again: false, ever_again: false, ending });
     }

@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 use core::fmt;
-use core::ops::{Deref, Range};
+use core::ops::Deref;
 
 use bytes::Bytes;
 
@@ -20,14 +20,17 @@ impl Payload<'_> {
     /// Returns the data. Borrowed data is copied.
     #[must_use]
     pub fn into_owned(self) -> Payload<'static> {
-        Payload(Source::Shared(self.slice(0..self.len())))
+        Payload(Source::Shared(self.into_first(usize::MAX)))
     }
 
-    /// Returns the octets of `range`. Borrowed octets are copied.
-    pub(crate) fn slice(&self, range: Range<usize>) -> Bytes {
-        match &self.0 {
-            Source::Borrowed(octets) => Bytes::copy_from_slice(&octets[range]),
-            Source::Shared(octets) => octets.slice(range),
+    /// Returns the first `count` octets, or all if there are fewer. Borrowed octets are copied.
+    pub(crate) fn into_first(self, count: usize) -> Bytes {
+        match self.0 {
+            Source::Borrowed(octets) => Bytes::copy_from_slice(&octets[..count.min(octets.len())]),
+            Source::Shared(mut octets) => {
+                octets.truncate(count);
+                octets
+            }
         }
     }
 }
