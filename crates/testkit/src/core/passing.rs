@@ -282,6 +282,11 @@ impl Core {
     /// Delivers a packet that has come out of a link, and records its end.
     #[inline(never)]
     fn take_watched(&mut self, parcel: Box<Parcel>) {
+        #[cfg(feature = "tcp")]
+        if parcel.followers.is_some() {
+            // The packets were sent before anybody looked at packets.
+            return self.split(parcel, |core, parcel| core.take_watched(parcel));
+        }
         if let Some(parcel) = self.wire.keep_back(parcel) {
             self.take_released(parcel);
         }
@@ -357,10 +362,7 @@ impl Core {
     fn arrive_other(&mut self, path: Path, parcel: Box<Parcel>) -> Result<(), Lost> {
         #[cfg(feature = "tcp")]
         if parcel.addresses.kind == Kind::Segment {
-            self.wire.held.remove(Held::cost(parcel.bytes.len()));
-            let end = self.arrive_segment(path.to, &parcel.bytes, parcel.arrival.marked);
-            self.spare.put(parcel);
-            return end;
+            return self.arrive_segments(path.to, parcel);
         }
         // As with Linux, only a connected socket gets the error. An unconnected socket could not tell which of its peers refused.
         if let Some(id) = self.socket_for(path.to, &parcel.addresses) {

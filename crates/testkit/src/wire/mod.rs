@@ -8,6 +8,8 @@ mod held;
 mod hitting;
 mod parcel;
 mod recording;
+#[cfg(feature = "tcp")]
+mod train;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;

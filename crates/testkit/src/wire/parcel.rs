@@ -11,6 +11,8 @@ use cohaptic_tcp::{Payload, Segment};
 use cohaptic_units::{Ecn, Instant};
 use cohaptic_wan::{NodeId, Path};
 
+#[cfg(feature = "tcp")]
+use super::train::Followers;
 use crate::trace::PacketName;
 
 /// Packet: bytes, and the addresses that the sender writes on the packet. A parcel is boxed on its whole way, from the sender through the link and the buffer
@@ -27,6 +29,9 @@ pub(crate) struct Parcel<A> {
     pub(crate) memory: usize,
     /// Report of the link. Valid only for a parcel that its link has delivered.
     pub(crate) arrival: Arrival,
+    /// Segments that travel with the segment of this parcel. Boxed, because most parcels travel alone.
+    #[cfg(feature = "tcp")]
+    pub(crate) followers: Option<Box<Followers>>,
 }
 
 /// Addresses of a packet, which determine the flow of the packet.
@@ -65,7 +70,16 @@ pub(crate) struct Arrival {
 impl<A> Parcel<A> {
     pub(crate) const fn new(addresses: A, bytes: Octets, ecn: Ecn) -> Self {
         let packet = PacketName { path: Path { from: NodeId(0), to: NodeId(0) }, sequence: 0, copy: 0 };
-        Self { addresses, bytes, ecn, is_hit: false, memory: 0, arrival: Arrival { packet, at: Instant::ZERO, marked: false, is_cut: false } }
+        Self {
+            addresses,
+            bytes,
+            ecn,
+            is_hit: false,
+            memory: 0,
+            arrival: Arrival { packet, at: Instant::ZERO, marked: false, is_cut: false },
+            #[cfg(feature = "tcp")]
+            followers: None,
+        }
     }
 }
 
@@ -219,11 +233,21 @@ impl Octets {
 
 /// Parcels of packets that were read, kept with their memory for later packets.
 #[derive(Debug)]
-pub(crate) struct Spare<A>(Vec<Box<Parcel<A>>>);
+pub(crate) struct Spare<A> {
+    parcels: Vec<Box<Parcel<A>>>,
+    /// Empty lists of followers.
+    #[cfg(feature = "tcp")]
+    #[expect(clippy::vec_box, reason = "a list moves from parcel to parcel in its box")]
+    followers: Vec<Box<Followers>>,
+}
 
 impl<A> Default for Spare<A> {
     fn default() -> Self {
-        Self(Vec::new())
+        Self {
+            parcels: Vec::new(),
+            #[cfg(feature = "tcp")]
+            followers: Vec::new(),
+        }
     }
 }
 
@@ -232,12 +256,15 @@ impl<A: Default> Spare<A> {
     const MOST: usize = 512;
     /// Largest capacity of the content of a kept parcel \[bytes\]. With [`MOST`](Self::MOST) this limits the kept memory to a megabyte.
     const LONGEST: usize = 2048;
+    /// Largest number of lists of followers kept: one for each of some connections that send at one instant.
+    #[cfg(feature = "tcp")]
+    const MOST_LISTS: usize = 64;
 
     /// Returns a parcel with a copy of `bytes`.
     #[inline(always)]
     pub(crate) fn copied(&mut self, addresses: A, bytes: &[u8], ecn: Ecn) -> Box<Parcel<A>> {
         // The addresses are stored directly, and passed to no further call: each address is written only once.
-        let mut parcel = self.0.pop().unwrap_or_else(empty);
+        let mut parcel = self.parcels.pop().unwrap_or_else(empty);
         (parcel.addresses, parcel.ecn) = (addresses, ecn);
         parcel.bytes.refill(bytes);
         parcel
@@ -246,7 +273,7 @@ impl<A: Default> Spare<A> {
     /// Returns a parcel with `segment`.
     #[cfg(feature = "tcp")]
     pub(crate) fn wrapped(&mut self, addresses: A, segment: Segment<'static>) -> Box<Parcel<A>> {
-        let mut parcel = self.0.pop().unwrap_or_else(empty);
+        let mut parcel = self.parcels.pop().unwrap_or_else(empty);
         (parcel.addresses, parcel.ecn) = (addresses, segment.ecn);
         let Octets { len, content } = &mut parcel.bytes;
         match content {
@@ -260,11 +287,27 @@ impl<A: Default> Spare<A> {
         parcel
     }
 
+    /// Lets `segment` follow the segments of `parcel`.
+    #[cfg(feature = "tcp")]
+    pub(crate) fn append(&mut self, parcel: &mut Parcel<A>, segment: Segment<'static>) {
+        let spare = &mut self.followers;
+        parcel.followers.get_or_insert_with(|| spare.pop().unwrap_or_default()).push(segment);
+    }
+
+    /// Takes back a list whose segments were handled or taken out. Drops the list if enough are kept, or if the list is long.
+    #[cfg(feature = "tcp")]
+    pub(crate) fn put_followers(&mut self, mut followers: Box<Followers>) {
+        followers.clear();
+        if self.followers.len() < Self::MOST_LISTS && followers.is_short() {
+            self.followers.push(followers);
+        }
+    }
+
     /// Takes back a read parcel. Drops the parcel if enough are kept, and the content if shared or too long.
     #[inline]
     pub(crate) fn put(&mut self, mut parcel: Box<Parcel<A>>) {
         // A burst must not occupy memory for the rest of the run.
-        if self.0.len() >= Self::MOST {
+        if self.parcels.len() >= Self::MOST {
             return;
         }
         match &mut parcel.bytes.content {
@@ -274,7 +317,7 @@ impl<A: Default> Spare<A> {
             Content::Segment(whole) => (whole.segment.payload, whole.packet) = (Payload::default(), OnceLock::new()),
             Content::Own(_) | Content::Shared(_) => parcel.bytes = Octets::default(),
         }
-        self.0.push(parcel);
+        self.parcels.push(parcel);
     }
 }
 
@@ -308,7 +351,7 @@ mod tests {
         let mut spare = Spare::default();
         for bytes in [Octets::from(Bytes::from_static(b"not ours")), Vec::with_capacity(Spare::<u8>::LONGEST + 1).into()] {
             spare.put(parcel_of(bytes));
-            let Some(Content::Own(kept)) = spare.0.first().map(|parcel| &parcel.bytes.content) else { panic!("the box is kept") };
+            let Some(Content::Own(kept)) = spare.parcels.first().map(|parcel| &parcel.bytes.content) else { panic!("the box is kept") };
             assert_eq!(kept.capacity(), 0);
             let filled = spare.copied(1, b"ours", Ecn::NotCapable);
             assert_eq!(&*filled.bytes, b"ours");
@@ -316,7 +359,7 @@ mod tests {
         for _ in 0..2 * Spare::<u8>::MOST {
             spare.put(parcel_of(Vec::with_capacity(1).into()));
         }
-        assert_eq!(spare.0.len(), Spare::<u8>::MOST);
+        assert_eq!(spare.parcels.len(), Spare::<u8>::MOST);
     }
 
     #[cfg(feature = "tcp")]
@@ -345,7 +388,7 @@ mod tests {
             assert_eq!((Segment::parse(&parcel.bytes), parcel.bytes[..].len()), (Ok(segment(octets)), 52 + octets.len()));
             assert!(is_written(&parcel));
             spare.put(parcel);
-            let Content::Segment(kept) = &spare.0[0].bytes.content else { panic!("the box is kept") };
+            let Content::Segment(kept) = &spare.parcels[0].bytes.content else { panic!("the box is kept") };
             assert!(kept.segment.payload.is_empty() && kept.packet.get().is_none());
         }
         assert_eq!(&*spare.copied(1, b"a datagram", Ecn::NotCapable).bytes, b"a datagram");

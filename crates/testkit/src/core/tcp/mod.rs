@@ -10,6 +10,7 @@ mod ports;
 mod program;
 mod slots;
 mod timers;
+mod trains;
 mod waits;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};

@@ -3,37 +3,46 @@
 use cohaptic_tcp::{Ecn, Flags, Segment, State};
 use cohaptic_wan::{NodeId, Path};
 
+use super::trains::Leaving;
 use super::{ConnId, Core};
-use crate::core::{Ends, Kind};
+use crate::core::{Ends, Kind, Parcel};
 use crate::trace::{Happening, Lost, PacketName};
-use crate::wire::Octets;
+use crate::wire::{Held, Octets};
 
 impl Core {
+    /// Handles a segment that has arrived at `host` in a parcel of its own.
+    pub(super) fn arrive_alone(&mut self, host: NodeId, mut parcel: Box<Parcel>) -> Result<(), Lost> {
+        self.wire.held.remove(Held::cost(parcel.bytes.len()));
+        let end = self.arrive_segment(host, &mut parcel.bytes, parcel.arrival.marked);
+        self.spare.put(parcel);
+        end
+    }
+
     /// Handles a packet that has arrived at `host`. `marked` tells whether a queue marked the packet.
-    pub(in crate::core) fn arrive_segment(&mut self, host: NodeId, packet: &Octets, marked: bool) -> Result<(), Lost> {
+    fn arrive_segment(&mut self, host: NodeId, packet: &mut Octets, marked: bool) -> Result<(), Lost> {
         if !self.is_up(host) {
             return Err(Lost::HostDown);
         }
-        match packet.segment() {
+        match packet.segment_mut() {
             Some(segment) => self.take_segment(host, segment, marked),
             // A packet that a link has damaged.
-            None => self.take_segment(host, &Segment::parse(packet).map_err(|_| Lost::Checksum)?, marked),
+            None => self.take_segment(host, &mut Segment::parse(packet).map_err(|_| Lost::Checksum)?, marked),
         }
     }
 
-    /// Handles a segment that has arrived whole. Only a segment with a mark of congestion is copied.
-    fn take_segment(&mut self, host: NodeId, segment: &Segment<'_>, marked: bool) -> Result<(), Lost> {
+    /// Handles a segment that has arrived whole, whose connection takes the data.
+    pub(super) fn take_segment(&mut self, host: NodeId, segment: &mut Segment<'_>, marked: bool) -> Result<(), Lost> {
         if !self.is_own(host, segment.destination.ip()) {
             return Err(Lost::NoSuchAddress);
         }
         if marked && segment.ecn != Ecn::NotCapable {
-            return self.route_segment(host, &Segment { ecn: Ecn::Congestion, ..segment.clone() });
+            segment.ecn = Ecn::Congestion;
         }
         self.route_segment(host, segment)
     }
 
     /// Hands a segment to its connection or listener, or refuses the segment.
-    fn route_segment(&mut self, host: NodeId, segment: &Segment<'_>) -> Result<(), Lost> {
+    fn route_segment(&mut self, host: NodeId, segment: &mut Segment<'_>) -> Result<(), Lost> {
         self.forget_old();
         // Only an opening segment may find a listener.
         let listener = if is_first(segment) { self.listener_at(host, segment.destination) } else { None };
@@ -46,7 +55,7 @@ impl Core {
             }
             let machine = &mut self.tcp.end_mut(id).machine;
             if listener.is_none() || !machine.gives_way_to(segment) {
-                machine.handle_segment(now, segment);
+                machine.take_segment(now, segment);
                 self.settle(id);
                 return Ok(());
             }
@@ -58,30 +67,34 @@ impl Core {
             return self.take_syn(listener, segment);
         }
         if let Some(reset) = segment.refusal(self.tcp_config(host).ttl) {
-            self.emit(host, None, reset);
+            self.emit(host, reset);
         }
         Err(Lost::NoSocket)
     }
 
-    /// Sends a segment of a connection, or of no connection, such as a refusal. The segment arrives when [`Core::take_arrivals`] is next called, even over a
-    /// link without delay.
-    fn emit(&mut self, host: NodeId, connection: Option<ConnId>, segment: Segment<'static>) {
-        // Short addresses are compared by their number alone.
+    /// Sends a segment of no connection, such as a refusal. The segment arrives when [`Core::take_arrivals`] is next called, even over a link without delay.
+    fn emit(&mut self, host: NodeId, segment: Segment<'static>) {
         let addresses = Ends::new(segment.source, segment.destination, Kind::Segment);
-        let Ends { from, to, is_six, .. } = addresses;
-        let path = if self.plan.is_own(host, to, is_six) {
-            let Some(path) = self.loopback_of(host) else {
-                self.tcp.loopback.push_back((host, segment));
-                return;
-            };
-            path
-        } else {
-            // The segment is lost if the host has given the source address up, or if no host has the destination any more.
-            let Some(receiver) = self.plan.owner_of(to, is_six).filter(|_| self.plan.has(host, from, is_six)) else { return };
-            let Some(path) = self.first_hop(Path { from: host, to: receiver }, &addresses) else { return };
-            path
-        };
-        self.emit_on(path, addresses, connection, segment);
+        match self.way(host, &addresses) {
+            Way::Loopback => self.tcp.loopback.push_back((host, segment)),
+            Way::Nowhere => {}
+            Way::On(path) => {
+                let parcel = self.spare.wrapped(addresses, segment);
+                self.emit_on(path, None, parcel);
+            }
+        }
+    }
+
+    /// Returns the way of the segments of `host` with these addresses.
+    pub(super) fn way(&self, host: NodeId, addresses: &Ends) -> Way {
+        // Short addresses are compared by their number alone.
+        let Ends { from, to, is_six, .. } = *addresses;
+        if self.plan.is_own(host, to, is_six) {
+            return self.loopback_of(host).map_or(Way::Loopback, Way::On);
+        }
+        // The segments are lost if the host has given the source address up, or if no host has the destination any more.
+        let receiver = self.plan.owner_of(to, is_six).filter(|_| self.plan.has(host, from, is_six));
+        receiver.and_then(|to| self.first_hop(Path { from: host, to }, addresses)).map_or(Way::Nowhere, Way::On)
     }
 
     /// Sends a segment of a NAT or a firewall, which may have the address of a host inside as its source.
@@ -89,16 +102,17 @@ impl Core {
         let addresses = Ends::new(segment.source, segment.destination, Kind::Segment);
         let owner = self.plan.owner_of(addresses.to, addresses.is_six);
         if let Some(path) = owner.and_then(|owner| self.first_hop(Path { from: node, to: owner }, &addresses)) {
-            self.emit_on(path, addresses, None, segment);
+            let parcel = self.spare.wrapped(addresses, segment);
+            self.emit_on(path, None, parcel);
         }
     }
 
     /// Offers a segment to its link.
     #[inline]
-    fn emit_on(&mut self, path: Path, addresses: Ends, connection: Option<ConnId>, segment: Segment<'static>) {
+    pub(super) fn emit_on(&mut self, path: Path, connection: Option<ConnId>, parcel: Box<Parcel>) {
+        let segment = parcel.bytes.segment().filter(|_| self.wire.recording().traces);
         // The entry is made before the offer, which takes the segment, and noted after the offer, so that the trace has the sending first.
-        let happening = self.wire.recording().traces.then(|| self.described(self.wire.next_packet(path), connection, &segment));
-        let parcel = self.spare.wrapped(addresses, segment);
+        let happening = segment.map(|segment| self.described(self.wire.next_packet(path), connection, segment));
         // A segment over a path that is cut is lost like any other packet.
         let _ = self.wire.offer(path, parcel);
         happening.into_iter().for_each(|happening| self.wire.note(happening));
@@ -131,20 +145,24 @@ impl Core {
 
     /// Delivers the next packet of loopback. Returns whether a packet was waiting.
     pub(in crate::core) fn take_from_loopback(&mut self) -> bool {
-        let Some((host, segment)) = self.tcp.loopback.pop_front() else { return false };
+        let Some((host, mut segment)) = self.tcp.loopback.pop_front() else { return false };
         // Fates of packets are recorded for links only. Loopback is not part of the network.
-        let _ = self.take_segment(host, &segment, false);
+        let _ = self.take_segment(host, &mut segment, false);
         true
     }
 
     /// Follows up any change of a connection: segments leave, tasks are woken if the change lets them go on, and the timer of the connection is set.
     pub(super) fn settle(&mut self, id: ConnId) {
-        let now = self.now();
-        let host = self.tcp.end(id).host;
-        while let Some(segment) = self.tcp.end_mut(id).machine.poll_transmit(now) {
-            self.emit(host, Some(id), segment);
-        }
-        self.recount(id);
+        let mut leaving = Leaving::default();
+        self.transmit(id, &mut leaving);
+        self.wake_ends(id);
+        self.depart(id, leaving);
+        self.follow_up(id);
+    }
+
+    /// Wakes the tasks that wait for the connection, if it lets them go on.
+    #[inline]
+    pub(super) fn wake_ends(&mut self, id: ConnId) {
         let end = self.tcp.connections.get_mut(id.0);
         if !end.readers.is_empty() && end.machine.is_readable() {
             end.readers.wake(&mut self.woken);
@@ -153,6 +171,13 @@ impl Core {
             end.is_write_blocked = false;
             end.writers.wake(&mut self.woken);
         }
+    }
+
+    /// Follows up the new state of a connection: sets its timer, and removes the connection if it is over.
+    pub(super) fn follow_up(&mut self, id: ConnId) {
+        let now = self.now();
+        self.recount(id);
+        let end = self.tcp.connections.get_mut(id.0);
         let (state, listener) = (end.machine.state(), end.listener);
         // The end of TIME-WAIT has no visible effect, so TIME-WAIT has no timer.
         let due = if state == State::TimeWait { None } else { end.machine.poll_timeout() };
@@ -184,6 +209,16 @@ impl Core {
         }
         if end.is_held || end.listener.is_some() { self.tcp.unroute(id) } else { self.remove_connection(id) }
     }
+}
+
+/// Way of the segments from one address to another.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Way {
+    /// Over the loopback of the host, without a link.
+    Loopback,
+    /// The segments are lost.
+    Nowhere,
+    On(Path),
 }
 
 /// Returns whether a segment opens a connection.

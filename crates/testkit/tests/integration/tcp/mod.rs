@@ -7,6 +7,8 @@ mod like_tokio;
 mod limits;
 mod records;
 mod times;
+#[cfg(feature = "strategies")]
+mod trains;
 mod traps;
 
 use std::time::Duration;
