@@ -1,8 +1,9 @@
 //! From trials and answers to the values of units, groups of people, in each condition.
 
 use cohaptic_campaign::Share;
+use cohaptic_harness::task::{Movement, throughput};
 
-use crate::folder::StudyFolder;
+use crate::folder::{KeptMovement, StudyFolder, needs_movements};
 use crate::model::{After, QuestionKind, Study};
 use crate::statistics::{ConditionMean, Difference, condition_means, differences_to_first};
 use crate::tables::{KeptTrial, mean};
@@ -19,6 +20,8 @@ pub(crate) struct Observation {
     pub(crate) timed_out: bool,
     /// Values of the measures, indexed by measure.
     pub(crate) values: Vec<Option<f64>>,
+    /// Movements to reached targets, for measures that need the movements of several trials together.
+    pub(crate) movements: Vec<Movement>,
 }
 
 /// Figures of a measure, or of a question about the conditions.
@@ -91,6 +94,7 @@ impl StudyFolder {
                 trial: trial.ended.plan.trial,
                 timed_out: trial.record.outcome == TIMED_OUT,
                 values: study.measures.iter().map(|name| trial.record.value(name)).collect(),
+                movements: trial.record.movements.iter().copied().map(KeptMovement::movement).collect(),
             })
         };
         let observations: Vec<Observation> = trials.iter().filter(counts).filter_map(observation).collect();
@@ -122,23 +126,32 @@ fn measure(study: &Study, units: usize, observations: &[Observation], place: usi
         let counts_as = (name == TIME && observation.timed_out).then_some(study.limit.as_secs_f64());
         observation.values[place].or(counts_as)
     };
-    let of = |condition: usize, wanted: &dyn Fn(&Observation) -> bool| -> Vec<f64> {
-        observations.iter().filter(|observation| observation.condition == condition && wanted(observation)).filter_map(value_of).collect()
-    };
-    let value = |unit: usize, condition: usize| {
-        // Trials of a unit are averaged first: the trials are not independent, and a unit with more valid trials must not weigh more.
-        let values = of(condition, &|observation| observation.unit == unit);
+    let of = |condition: usize, wanted: &dyn Fn(&Observation) -> bool| -> Option<f64> {
+        let chosen = chosen(observations, condition, wanted);
+        if needs_movements(name) {
+            // The spread of the ends needs more movements than a trial has.
+            return throughput(&chosen.iter().flat_map(|observation| &observation.movements).copied().collect::<Vec<_>>());
+        }
+        let values: Vec<f64> = chosen.into_iter().filter_map(value_of).collect();
         (!values.is_empty()).then(|| mean(&values))
     };
+    // Trials of a unit are averaged first: the trials are not independent, and a unit with more valid trials must not weigh more.
+    let value = |unit: usize, condition: usize| of(condition, &|observation| observation.unit == unit);
+    let counts = |observation: &&Observation| value_of(observation).is_some() || needs_movements(name);
     let conditions = 0..study.conditions.len();
     let timed_out = conditions.clone().map(|condition| {
         // Both counts leave out trials without a value, so that the share describes the same trials as the mean.
-        let timed_out = of(condition, &|observation| observation.timed_out).len() as u64;
-        Share::of(timed_out, of(condition, &|_| true).len() as u64)
+        let trials = |wanted: &dyn Fn(&Observation) -> bool| chosen(observations, condition, wanted).into_iter().filter(counts).count() as u64;
+        Share::of(trials(&|observation| observation.timed_out), trials(&|_| true))
     });
     // A repetition has the number of the repeated trial and fills its place on the curve.
-    let curve = |condition: usize| (1..=study.trials).map(|trial| mean(&of(condition, &|observation| observation.trial == trial))).collect();
+    let curve =
+        |condition: usize| (1..=study.trials).map(|trial| of(condition, &|observation| observation.trial == trial).unwrap_or(f64::NAN)).collect();
     Analysed { timed_out: timed_out.collect(), curves: conditions.map(curve).collect(), ..analysed(study, name.to_owned(), units, value) }
+}
+
+fn chosen<'a>(observations: &'a [Observation], condition: usize, wanted: &dyn Fn(&Observation) -> bool) -> Vec<&'a Observation> {
+    observations.iter().filter(|observation| observation.condition == condition && wanted(observation)).collect()
 }
 
 /// Returns the figures of values by unit and condition.

@@ -43,7 +43,7 @@ pub use analysis::{Analysed, Analysis};
 pub use codes::{CodeError, GroupCode, PersonCode, TrialCode};
 pub use dry_run::{DifferencePower, NoWatch, Power, Watch, power_lines, timed_out_lines};
 pub use error::StudyError;
-pub use folder::{RoundTrip, StudyFolder, TrialFacts, TrialRecord};
+pub use folder::{KeptMovement, RoundTrip, StudyFolder, TrialFacts, TrialRecord};
 pub use model::{After, Breaks, Condition, Factor, Order, Person, Question, QuestionKind, Study, TLX};
 pub use read::ROOT;
 pub use sequence::{Answer, EndedTrial, Event, Fault, GivenAnswer, Sequence, SequenceError, Step, TrialPlan};

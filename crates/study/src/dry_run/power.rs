@@ -150,7 +150,8 @@ pub(super) fn analysis_of(study: &Study, watch: &dyn Watch) -> Result<Option<Ana
         let value = |name: &String| run.values.iter().find(|measured| measured.name.text(&trial.scene) == *name).and_then(|measured| measured.value);
         let timed_out = run.task.as_ref().is_some_and(|task| task.outcome == TaskOutcome::TimedOut);
         let values = study.measures.iter().map(value).collect();
-        Ok(Some(Observation { unit: *unit, condition: plan.condition, trial: plan.trial, timed_out, values }))
+        let movements = run.task.map(|task| task.movements).unwrap_or_default();
+        Ok(Some(Observation { unit: *unit, condition: plan.condition, trial: plan.trial, timed_out, values, movements }))
     };
     // All trials are planned before the first is run, because a plan needs its session and a run needs only the plan.
     let observations: Vec<Option<Observation>> = trials.par_iter().map(observe).collect::<Result<_, StudyError>>()?;

@@ -35,7 +35,8 @@ use crate::model::Study;
 use crate::sequence::{Event, Sequence, SequenceError, Step};
 
 pub(crate) use group::{Group, GroupState};
-pub use record::{RoundTrip, TrialFacts, TrialRecord};
+pub(crate) use record::needs_movements;
+pub use record::{KeptMovement, RoundTrip, TrialFacts, TrialRecord};
 
 use kept_study::KeptStudy;
 

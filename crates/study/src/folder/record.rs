@@ -2,11 +2,13 @@
 
 use std::io::Write as _;
 use std::path::Path;
+use std::time::Duration;
 
 use cohaptic_files::{read_text, write_whole};
 use cohaptic_harness::live::{Inputs, RecordedScene, replay};
 use cohaptic_harness::measures::Measures;
-use cohaptic_scene::{Scene, link_keys_of_text, scene_content_of_text};
+use cohaptic_harness::task::Movement;
+use cohaptic_scene::{Measure, Scene, link_keys_of_text, scene_content_of_text};
 use serde::{Deserialize, Serialize};
 
 use crate::codes::TrialCode;
@@ -52,6 +54,38 @@ pub struct TrialRecord {
     pub time_s: f64,
     /// Values of the measures, in the order of [`Study::measures`](crate::Study::measures); `None` for a measure without a value.
     pub values: Vec<(String, Option<f64>)>,
+    /// Movements to reached targets, for a study whose measures need the movements of several trials together; otherwise empty.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub movements: Vec<KeptMovement>,
+}
+
+/// Movement to a target, along the line from the target before.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KeptMovement {
+    /// Distance moved \[m\].
+    pub distance_m: f64,
+    /// Position of the end beyond the target \[m\].
+    pub beyond_m: f64,
+    /// Time of the movement \[s\].
+    pub time_s: f64,
+}
+
+impl KeptMovement {
+    pub(crate) fn of(movement: &Movement) -> Self {
+        Self { distance_m: movement.distance, beyond_m: movement.deviation, time_s: movement.time.as_secs_f64() }
+    }
+
+    pub(crate) fn movement(self) -> Movement {
+        // A time that cannot be is a change by hand, which `verify` names.
+        let time = Duration::try_from_secs_f64(self.time_s).unwrap_or_default();
+        Movement { distance: self.distance_m, deviation: self.beyond_m, time }
+    }
+}
+
+/// Returns whether a measure of a condition needs the movements of several trials together: the spread of the ends, and so the throughput.
+pub(crate) fn needs_movements(measure: &str) -> bool {
+    measure == Measure::Throughput.name()
 }
 
 /// Name of the record in the folder of a trial.
@@ -63,8 +97,8 @@ impl TrialRecord {
         let TrialFacts { mut faults, late_ticks, round_trips } = facts;
         faults.sort_unstable();
         faults.dedup();
-        let Replayed { outcome, time_s, values } = Replayed::of(folder)?;
-        Ok(Self { trial, faults, late_ticks, round_trips, outcome, time_s, values })
+        let Replayed { outcome, time_s, values, movements } = Replayed::of(folder)?;
+        Ok(Self { trial, faults, late_ticks, round_trips, outcome, time_s, values, movements })
     }
 
     pub(crate) fn write(&self, folder: &Path) -> Result<(), StudyError> {
@@ -86,7 +120,7 @@ impl TrialRecord {
 
     /// Returns the differences between the record and the replay of the trial's scene and inputs, in words.
     pub(crate) fn differences(&self, folder: &Path) -> Result<Vec<String>, StudyError> {
-        let Replayed { outcome, time_s, values } = Replayed::of(folder)?;
+        let Replayed { outcome, time_s, values, movements } = Replayed::of(folder)?;
         let mut differences = Vec::new();
         let mut compare = |name: &str, kept: String, replayed: String| {
             if kept != replayed {
@@ -96,6 +130,7 @@ impl TrialRecord {
         compare("outcome", self.outcome.clone(), outcome);
         // Numbers are compared as their shortest texts, which differ whenever two finite numbers differ, and serve the message too.
         compare("time_s", format!("{:?}", self.time_s), format!("{time_s:?}"));
+        compare("a movement", format!("{:?}", self.movements), format!("{movements:?}"));
         let text = |value: &Option<f64>| value.map_or_else(|| "nothing".to_owned(), |value| format!("{value:?}"));
         // The longer list sets the end, so that a missing measure and an additional one are both found.
         for place in 0..self.values.len().max(values.len()) {
@@ -117,6 +152,7 @@ struct Replayed {
     outcome: String,
     time_s: f64,
     values: Vec<(String, Option<f64>)>,
+    movements: Vec<KeptMovement>,
 }
 
 impl Replayed {
@@ -142,7 +178,10 @@ impl Replayed {
         let Ok(summary) = replay(&scene, &inputs, &mut measures);
         let Some(task) = measures.task(&summary) else { return Err(StudyError::damaged(&scene_file, "it has no task")) };
         let values = measures.values(summary.duration).into_iter().map(|measured| (measured.name.text(&scene), measured.value));
-        Ok(Self { outcome: task.outcome.name().to_owned(), time_s: task.time.as_secs_f64(), values: values.collect() })
+        let values: Vec<(String, Option<f64>)> = values.collect();
+        let needed = values.iter().any(|(name, _)| needs_movements(name));
+        let movements = if needed { task.movements.iter().map(KeptMovement::of).collect() } else { Vec::new() };
+        Ok(Self { outcome: task.outcome.name().to_owned(), time_s: task.time.as_secs_f64(), values, movements })
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::*;
 use crate::dry_run::NoWatch;
-use crate::folder::{RoundTrip, TrialFacts};
+use crate::folder::{KeptMovement, RoundTrip, TrialFacts};
 use crate::model::{Order, Study};
 use crate::sequence::{Event, Fault, Sequence, Step};
 use crate::testing::study;
@@ -259,6 +259,42 @@ fn valid_trials_without_practice_are_analysed_and_a_timeout_counts_as_the_limit(
     let found = times(&trials);
     assert_eq!((found.rows, found.left_out, found.differences[0].estimate.mean), (vec![vec![2.0, 12.5]], 1, 10.5));
     assert_eq!(folder.analysis_of(&trials).measures[1].left_out, 2);
+}
+
+/// Each trial moves to three targets in a plane. One trial of a dry run has a throughput of its own from three ends, and a group in a condition has that of the
+/// ends of all of its trials.
+#[test]
+fn the_throughput_of_a_group_is_that_of_the_movements_of_all_its_trials() {
+    let at = tempfile::tempdir().unwrap();
+    let study = Study { trials: 2, measures: vec!["throughput_bit_s".to_owned()], questions: Vec::new(), ..short() };
+    let mut folder = StudyFolder::open_dry(study, at.path(), PROGRAM).unwrap();
+    assert!(folder.play_dry(&NoWatch).unwrap());
+    assert_eq!(folder.verify().unwrap().differences, [""; 0]);
+    let mut trials = folder.kept_trials().unwrap();
+    assert!(trials.iter().all(|trial| trial.record.movements.len() == 3 && trial.record.value("throughput_bit_s").is_some()));
+    let kept = folder.analysis().unwrap().measures[0].clone();
+    let of_trials = |trials: &[crate::tables::KeptTrial]| {
+        let movements: Vec<_> = trials.iter().flat_map(|trial| &trial.record.movements).map(|movement| movement.movement()).collect();
+        cohaptic_harness::task::throughput(&movements).unwrap()
+    };
+    // The first two trials of a session are those of the first condition.
+    let expected: Vec<Vec<f64>> = trials.chunks(4).map(|session| session.chunks(2).map(of_trials).collect()).collect();
+    assert_eq!(kept.rows, expected);
+    // A movement over 0.16 m in each of two trials, whose ends are 2 mm apart: W = √(2πe)·√2 mm. No trial alone has a spread.
+    for (trial, end) in trials.iter_mut().zip([0.001, -0.001].into_iter().cycle()) {
+        trial.record.movements = vec![KeptMovement { distance_m: 0.16, beyond_m: end, time_s: 0.5 }];
+        trial.record.values[0].1 = None;
+    }
+    let found = folder.analysis_of(&trials).measures[0].clone();
+    let width = (2.0 * std::f64::consts::PI * std::f64::consts::E).sqrt() * 2f64.sqrt() * 1e-3;
+    let rate = (0.16 / width + 1.0).log2() / 0.5;
+    assert!(found.rows.iter().flatten().all(|value| (value - rate).abs() < 1e-12) && found.rows.len() == 2, "{:?}, expected {rate}", found.rows);
+    assert_eq!(found.timed_out.iter().flatten().map(|share| (share.count, share.of)).collect::<Vec<_>>(), [(0, 4), (0, 4)]);
+    let file = at.path().join("trials/G01-002/trial.json");
+    let text = fs::read_to_string(&file).unwrap();
+    fs::write(&file, text.replacen("\"distance_m\": ", "\"distance_m\": 1", 1)).unwrap();
+    let found = folder.verify().unwrap().differences;
+    assert!(found.iter().any(|difference| difference.starts_with("G01-002: a movement is ")), "{found:?}");
 }
 
 /// The session records a trial only after the folder of the trial has got its final name.
