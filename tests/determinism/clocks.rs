@@ -5,7 +5,7 @@ use std::time::Duration;
 use cohaptic_harness::{Ending, Model};
 use cohaptic_peer::Drift;
 use cohaptic_scene::Scene;
-use cohaptic_tests::{cases, drafts};
+use cohaptic_tests::{are_all, cases, drafts};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -45,11 +45,12 @@ fn spread(scene: &mut Scene, ppm: i64) {
     }
 }
 
-/// Of 257 peers on the means are exact, whether packets arrive in order or not.
+/// Of 257 peers on the means are exact, whether packets arrive in order or not. Links without chance are among all cases.
 #[test]
 fn many_clocks_come_to_the_same() {
     let overtaking = "delay = \"6ms\", jitter = { sd = \"3ms\", distribution = \"uniform\" }, order = \"allow-reordering\"";
-    for (link, update) in [("delay = \"3ms\"", 8), ("delay = \"3ms\", jitter = \"400us\", loss = \"5%\"", 8), (overtaking, 2)] {
+    let links = [("delay = \"3ms\"", 8), ("delay = \"3ms\", jitter = \"400us\", loss = \"5%\"", 8), (overtaking, 2)];
+    for (link, update) in links.into_iter().skip(if are_all() { 0 } else { 1 }) {
         let mut scene = mesh(260, link);
         scene.coordination.update = Duration::from_millis(update);
         scene.peers.iter_mut().zip(0..).for_each(|(peer, place)| peer.phase = place % update);

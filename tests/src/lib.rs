@@ -32,10 +32,16 @@ use proptest::test_runner::RngSeed;
 /// The variable of the environment with which a property test draws all of its cases. `.ci/nightly` sets it.
 pub const ALL_CASES_VARIABLE: &str = "COHAPTIC_TEST_ALL_CASES";
 
+/// Returns whether all cases are asked for, by [`ALL_CASES_VARIABLE`].
+#[must_use]
+pub fn are_all() -> bool {
+    std::env::var_os(ALL_CASES_VARIABLE).is_some()
+}
+
 /// A property test that leaves no files behind. It draws `count` cases if [`ALL_CASES_VARIABLE`] is set, and the first quarter of them otherwise.
 #[must_use]
 pub fn cases(count: u32) -> ProptestConfig {
-    let cases = if std::env::var_os(ALL_CASES_VARIABLE).is_some() { count } else { count.div_ceil(4) };
+    let cases = if are_all() { count } else { count.div_ceil(4) };
     ProptestConfig { cases, failure_persistence: None, max_shrink_iters: 400, ..ProptestConfig::default() }
 }
 
