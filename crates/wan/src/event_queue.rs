@@ -19,12 +19,19 @@
 //!
 //! The width of the buckets adapts to the events, so a bucket holds 4 to 16 events on average. With fewer events per bucket, searches for the next bucket
 //! cost more; with more events, sorting costs more.
+//!
+//! A short calendar has no buckets: all events lie in the front, and each is inserted there. With few events in all, buckets hold so few that finding and
+//! emptying them takes longer than the insertion.
+
+mod slab;
 
 use alloc::collections::{BinaryHeap, VecDeque};
 use alloc::vec::Vec;
 use core::cmp::Reverse;
 
 use cohaptic_units::Instant;
+
+use slab::Slab;
 
 use crate::ring::Ring;
 
@@ -51,7 +58,10 @@ pub struct EventQueue<E> {
     slab: Slab<E>,
     /// Events in order, with the next events to take: the events of the current bucket, and events pushed later into this bucket or an earlier bucket.
     front: VecDeque<Entry>,
-    /// Number of the current bucket: its instant divided by the width. Every event in `ring` and in `far` lies in a later bucket.
+    /// Whether all events of the calendar lie in `front`, whatever their buckets: as long as there were at most [`SHORT`] since the calendar was empty.
+    is_short: bool,
+    /// Number of the current bucket: its instant divided by the width. Every event in `ring` and in `far` lies in a later bucket. Without meaning in a short
+    /// calendar.
     current: u64,
     /// Unsorted buckets after the current bucket, indexed by [`slot`]. Fewer than `RING` consecutive buckets are in use, so no two share a slot.
     ring: Vec<Vec<Packed>>,
@@ -83,6 +93,8 @@ const RING: usize = 8192;
 const WIDTHS: core::ops::RangeInclusive<u32> = 14..=22;
 /// Initial exponent of the width: buckets of 131 µs.
 const FIRST_WIDTH: u32 = 17;
+/// Most events of a short calendar.
+const SHORT: usize = 48;
 /// Number of buckets brought to the front between two checks of the width.
 const LOOK_EVERY: u32 = 1024;
 /// Average number of events per bucket without a change of the width.
@@ -101,8 +113,9 @@ impl<E: Event> EventQueue<E> {
         Self {
             ordered: Ring::new(),
             in_order: true,
-            slab: Slab { places: Vec::new(), free: Vec::new() },
+            slab: Slab::new(),
             front: VecDeque::new(),
+            is_short: false,
             current: 0,
             ring: Vec::new(),
             occupied: [0; RING / 64],
@@ -172,8 +185,7 @@ impl<E: Event> EventQueue<E> {
             }
             return self.ordered.pop();
         }
-        // The front is tried first, because a search for the next bucket is needed once per bucket only.
-        if self.front.front().is_none_or(|first| first.0 > now) && !self.advance(now) {
+        if !self.is_due(now) {
             return None;
         }
         let (_, place) = self.front.pop_front()?;
@@ -191,7 +203,7 @@ impl<E: Event> EventQueue<E> {
             self.ordered.front().filter(|first| first.at() <= now)?;
             self.ordered.pass_front()?
         } else {
-            if self.front.front().is_none_or(|first| first.0 > now) && !self.advance(now) {
+            if !self.is_due(now) {
                 return None;
             }
             let (_, place) = self.front.pop_front()?;
@@ -208,10 +220,19 @@ impl<E: Event> EventQueue<E> {
         if self.in_order {
             return self.ordered.front().filter(|first| first.at() <= now).map(Event::key);
         }
-        if self.front.front().is_none_or(|first| first.0 > now) && !self.advance(now) {
+        if !self.is_due(now) {
             return None;
         }
         self.front.front().and_then(|first| self.slab.key(first.1))
+    }
+
+    /// Returns whether the front of the calendar begins with an event that is due at `now`, after a search for the next bucket if the front is empty.
+    #[inline(always)]
+    fn is_due(&mut self, now: Instant) -> bool {
+        match self.front.front() {
+            Some(first) => first.0 <= now,
+            None => self.advance(now),
+        }
     }
 
     /// Returns whether an event may be due at `now`, without a search. `false` is certain. After `true`, no event need be due.
@@ -245,10 +266,8 @@ impl<E: Event> EventQueue<E> {
     #[cold]
     fn become_calendar(&mut self) {
         self.in_order = false;
+        self.is_short = true;
         self.quiet_until = Instant::MAX;
-        self.ring.resize_with(RING, Vec::new);
-        // Events are in order, so no event lies before the bucket of the first event.
-        self.current = self.ordered.front().map_or(0, |first| self.bucket_of(first.at()));
         let mut ordered = core::mem::take(&mut self.ordered);
         while let Some(event) = ordered.pop() {
             self.push_calendar(event);
@@ -263,8 +282,28 @@ impl<E: Event> EventQueue<E> {
         self.push_entry((at, place));
     }
 
+    /// Distributes the events of a short calendar, which are all in the front, to buckets.
+    #[cold]
+    fn fill_buckets(&mut self) {
+        self.is_short = false;
+        self.ring.resize_with(RING, Vec::new);
+        let events = core::mem::take(&mut self.front);
+        // Events of the front are in order, so no event lies before the bucket of the first event.
+        self.current = events.front().map_or(0, |first| self.bucket_of(first.0));
+        for entry in events {
+            self.push_entry(entry);
+        }
+    }
+
     #[inline]
     fn push_entry(&mut self, entry: Entry) {
+        if self.is_short {
+            self.push_front(entry);
+            if self.len > SHORT {
+                self.fill_buckets();
+            }
+            return;
+        }
         // Past events and events of the current bucket go to the sorted front. Later buckets stay unsorted until their time comes.
         let bucket = self.bucket_of(entry.0);
         if bucket <= self.current {
@@ -394,13 +433,13 @@ impl<E: Event> EventQueue<E> {
 
     /// Inserts an entry into the front by instant and key.
     fn push_front(&mut self, entry: Entry) {
-        let key = |(at, place): Entry| (at, self.slab.key(place));
-        let wanted = key(entry);
+        // Instants differ for nearly all pairs, so keys are read from the slab only for two equal instants.
+        let precedes = |other: &Entry| other.0 < entry.0 || other.0 == entry.0 && self.slab.key(other.1) <= self.slab.key(entry.1);
         // Events of a burst are mostly pushed in order, so the end is tried before a binary search.
-        if self.front.back().is_none_or(|last| key(*last) <= wanted) {
+        if self.front.back().is_none_or(precedes) {
             self.front.push_back(entry);
         } else {
-            let place = self.front.partition_point(|other| key(*other) <= wanted);
+            let place = self.front.partition_point(precedes);
             self.front.insert(place, entry);
         }
     }
@@ -473,58 +512,6 @@ fn sort<'a>(words: &'a mut [Packed], few: &'a mut [Packed; FEW]) -> &'a mut [Pac
 
 /// Largest number of words sorted by counting.
 const FEW: usize = 24;
-
-/// Storage of events with stable indices. Indices of removed events are reused.
-#[derive(Clone, Debug)]
-struct Slab<E> {
-    /// Events by index. `None` for a free index.
-    places: Vec<Option<E>>,
-    /// Free indices.
-    free: Vec<u32>,
-}
-
-impl<E: Event> Slab<E> {
-    /// Stores an event constructed by `make`, and returns its index.
-    #[inline(always)]
-    fn store(&mut self, make: impl FnOnce() -> E) -> u32 {
-        let place = self.free.pop().unwrap_or_else(|| self.grow());
-        let stored = &mut self.places[place as usize];
-        // Always true: only free indices are handed out. With the test the compiler knows of no old event to drop, so the event can be constructed in its
-        // place.
-        if stored.is_none() {
-            *stored = Some(make());
-        }
-        place
-    }
-
-    /// Adds an index without an event, and returns the index.
-    #[cold]
-    #[inline(never)]
-    fn grow(&mut self) -> u32 {
-        let place = u32::try_from(self.places.len()).expect("fewer than 2^32 events, 200 GB of them, are pending");
-        self.places.push(None);
-        place
-    }
-
-    /// Frees an index, and returns its place. The caller must take the event out of the place before the next call of `store`.
-    #[inline(always)]
-    fn pass(&mut self, place: u32) -> &mut Option<E> {
-        self.free.push(place);
-        &mut self.places[place as usize]
-    }
-
-    /// Removes and returns the event at an index.
-    #[inline]
-    fn take(&mut self, place: u32) -> Option<E> {
-        self.free.push(place);
-        self.places[place as usize].take()
-    }
-
-    /// Returns the key of a stored event, or `None` for a free index.
-    fn key(&self, place: u32) -> Option<E::Key> {
-        self.places[place as usize].as_ref().map(Event::key)
-    }
-}
 
 #[cfg(test)]
 mod tests {

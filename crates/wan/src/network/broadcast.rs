@@ -151,9 +151,9 @@ fn schedule_each<P: Clone>(row: &mut Row<P>, first: LinkId, traffic: &mut Traffi
         for (words, line) in words.iter_mut().zip(&*lines) {
             *words = line.words();
         }
-        for ((line, words), to) in lines.iter_mut().zip(words).zip((begin..).map(NodeId)).filter(|(_, to)| *to != sent.from) {
+        for ((line, words), to) in lines.iter_mut().zip(&words).zip((begin..).map(NodeId)).filter(|(_, to)| *to != sent.from) {
             let sequence = line.offered();
-            match line.offer(sent.now, Some(words)) {
+            match line.offer(sent.now, Some(*words)) {
                 Outcome::Arrives(at) if at > sent.now => {
                     traffic.schedule_after(before, at, link_to(first, to), sent.packet(to, sequence));
                     before = Some(at);

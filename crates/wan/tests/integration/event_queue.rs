@@ -43,6 +43,8 @@ enum When {
 #[derive(Clone, Copy, Debug)]
 enum Step {
     Push(When, u8),
+    /// As many events, out of order, spread over this span \[ns\] after the latest instant so far: a queue of any number of events, few or many.
+    Burst(u64, usize),
     /// Lets time pass and takes at most so many events.
     Pop(u64, usize),
     /// Lets time pass until the next event.
@@ -75,6 +77,7 @@ fn steps() -> BoxedStrategy<Vec<Step>> {
     vec(
         prop_oneof![
             10 => (when, 0..4u8).prop_map(|(when, rank)| Step::Push(when, rank)),
+            1 => (0..BUCKET * 300, 1..150usize).prop_map(|(span, count)| Step::Burst(span, count)),
             4 => (quiet.clone(), 0..6usize).prop_map(|(span, count)| Step::Pop(span, count)),
             3 => Just(Step::Next),
             1 => quiet.prop_map(Step::Drain),
@@ -100,9 +103,19 @@ proptest! {
                         When::Behind(span) => now.saturating_sub(span),
                         When::Exactly(instant) => instant,
                     };
-                    let note = Note { at: at(instant), rank, serial };
+                    let note = Note { at: at(instant), rank, serial: serial * 1_000 };
                     queue.push(note);
                     heap.push(Reverse(note));
+                    0
+                }
+                Step::Burst(span, count) => {
+                    for number in 0..count {
+                        // 37 has no factor in common with most counts, so that few events of a burst have one instant.
+                        let place = (number * 37 % count) as u64;
+                        let note = Note { at: at(now.saturating_add(span / count as u64 * place)), rank: 0, serial: serial * 1_000 + number };
+                        queue.push(note);
+                        heap.push(Reverse(note));
+                    }
                     0
                 }
                 Step::Pop(span, count) => {
