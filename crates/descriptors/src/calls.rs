@@ -10,9 +10,10 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr};
 use std::os::fd::OwnedFd;
 use std::sync::Arc;
 
-use cohaptic_sockets::{Bed, Call, Datagrams, Listener, Membership, Ready, Received, Sending, Socket, Stream, Version};
+use cohaptic_sockets::{Bed, Call, DatagramOption, Datagrams, Listener, Ready, Received, Sending, Socket, Stream, Version};
 use socket2::{SockRef, Type};
 
+use crate::multicast::MulticastChange;
 use crate::options::{read, set_changed};
 use crate::placeholder::{Placeholder, keep, set_all};
 use crate::table::{self, Kind, Numbered, Virtual};
@@ -178,6 +179,8 @@ fn datagrams(of: Numbered<'_>, name: &'static str, version: Version, at: SocketA
     let socket: Arc<dyn Datagrams> = bed()?.bind(Call::of_system(name), at)?.into();
     set_all(Type::DGRAM, &*socket, of.fd)?;
     note_options(of);
+    let early = table::with(of, |kept| std::mem::take(&mut kept.early)).unwrap_or_default();
+    early.into_iter().try_for_each(|change| change.apply(&*socket))?;
     put(of, Kind::owned(Arc::clone(&socket)));
     Ok(socket)
 }
@@ -412,13 +415,43 @@ pub fn option_set(of: Numbered<'_>) -> io::Result<()> {
     }
 }
 
-/// Joins or leaves a multicast group.
-pub fn change_membership(of: Numbered<'_>, membership: Membership) -> Option<io::Result<()>> {
+/// Returns a socket at any port with the changes that wait for the bind of a new descriptor. The socket of the descriptor itself is not bound before the program
+/// says where.
+fn trial(of: Numbered<'_>, version: Version) -> io::Result<Box<dyn Datagrams>> {
+    let socket = bed()?.bind(Call::of_system("setsockopt"), any_address(version))?;
+    let early = table::with(of, |kept| kept.early.clone()).unwrap_or_default();
+    early.into_iter().try_for_each(|change| change.apply(&*socket))?;
+    Ok(socket)
+}
+
+/// Joins or leaves a multicast group, or selects the interface for multicast. Before the bind of a descriptor the change is checked, and waits for the bind.
+pub fn change_multicast(of: Numbered<'_>, change: MulticastChange) -> Option<io::Result<()>> {
     Some(match found(of)? {
-        Found::Datagrams(socket) => socket.change_membership(membership),
+        Found::Datagrams(socket) => change.apply(&*socket),
         Found::New(Type::DGRAM, version) => {
-            datagrams(of, "setsockopt", version, any_address(version)).and_then(|socket| socket.change_membership(membership))
+            let outcome = trial(of, version).and_then(|socket| change.apply(&*socket));
+            if outcome.is_ok() {
+                table::with(of, |kept| kept.early.push(change));
+            }
+            outcome
         }
+        Found::Socket(socket) => {
+            put(of, Virtual::Socket(socket));
+            fail(errno::INVALID)
+        }
+        Found::New(..) | Found::Stream(_) | Found::Listener(_) | Found::Gone => fail(errno::INVALID),
+    })
+}
+
+/// Returns the interface for multicast over a version of IP: the 32 bits of an address of IPv4, or a number with IPv6. 0 if the host chooses.
+pub fn multicast_interface(of: Numbered<'_>, version: Version) -> Option<io::Result<u32>> {
+    let option = match version {
+        Version::Four => DatagramOption::MulticastInterface4,
+        Version::Six => DatagramOption::MulticastInterface6,
+    };
+    Some(match found(of)? {
+        Found::Datagrams(socket) => socket.option(option),
+        Found::New(Type::DGRAM, own) => trial(of, own).and_then(|socket| socket.option(option)),
         Found::Socket(socket) => {
             put(of, Virtual::Socket(socket));
             fail(errno::INVALID)

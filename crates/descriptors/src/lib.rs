@@ -21,9 +21,11 @@
 #![cfg(unix)]
 
 pub mod calls;
+mod multicast;
 mod options;
 mod placeholder;
 mod table;
 
+pub use multicast::MulticastChange;
 pub use placeholder::{Placeholder, Pointer, find, keep, set_all, take, unbound};
 pub use table::{Held, Kind, Numbered, Virtual};

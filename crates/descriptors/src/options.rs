@@ -17,7 +17,6 @@ pub(crate) fn read(socket: &SockRef<'_>) -> Vec<Setting> {
     let size = |size: usize| u32::try_from(size).unwrap_or(u32::MAX);
     let type_of_service = if is_six { class(socket) } else { service(socket) };
     let ttl = if is_six { socket.unicast_hops_v6() } else { socket.ttl_v4() };
-    let multicast_loop = if is_six { socket.multicast_loop_v6() } else { socket.multicast_loop_v4() };
     let settings = [
         socket.tcp_nodelay().map(Setting::NoDelay),
         keepalive(socket).map(Setting::Keepalive),
@@ -32,7 +31,10 @@ pub(crate) fn read(socket: &SockRef<'_>) -> Vec<Setting> {
         socket.only_v6().map(Setting::OnlyV6),
         socket.broadcast().map(Setting::Broadcast),
         socket.multicast_ttl_v4().map(Setting::MulticastTtl),
-        multicast_loop.map(Setting::MulticastLoop),
+        socket.multicast_loop_v4().map(Setting::MulticastLoop4),
+        // A socket of IPv4 has no options of IPv6.
+        socket.multicast_hops_v6().map(Setting::MulticastHops),
+        socket.multicast_loop_v6().map(Setting::MulticastLoop6),
     ];
     settings.into_iter().flatten().collect()
 }
@@ -57,11 +59,12 @@ pub(crate) fn write(socket: &SockRef<'_>, setting: Setting) -> io::Result<()> {
         Setting::ReusePort(on) => set_reuse_port(socket, on),
         Setting::OnlyV6(on) => socket.set_only_v6(on),
         Setting::Broadcast(on) => socket.set_broadcast(on),
-        // A socket of IPv6 has this option of IPv4 on Linux alone.
-        Setting::MulticastTtl(_) if is_six && !cfg!(any(target_os = "linux", target_os = "android")) => Ok(()),
+        // A socket of IPv6 has these options of IPv4 on Linux alone.
+        Setting::MulticastTtl(_) | Setting::MulticastLoop4(_) if is_six && !cfg!(any(target_os = "linux", target_os = "android")) => Ok(()),
         Setting::MulticastTtl(ttl) => socket.set_multicast_ttl_v4(ttl),
-        Setting::MulticastLoop(on) if is_six => socket.set_multicast_loop_v6(on),
-        Setting::MulticastLoop(on) => socket.set_multicast_loop_v4(on),
+        Setting::MulticastHops(hops) => socket.set_multicast_hops_v6(hops),
+        Setting::MulticastLoop4(on) => socket.set_multicast_loop_v4(on),
+        Setting::MulticastLoop6(on) => socket.set_multicast_loop_v6(on),
     }
 }
 

@@ -11,6 +11,8 @@ use std::sync::{Arc, Weak};
 use cohaptic_sockets::{Bed, Configured, Datagrams, Listener, Setting, Socket, Stream, Version, outside};
 use socket2::Type;
 
+use crate::multicast::MulticastChange;
+
 thread_local! {
     /// Sockets of test beds of this thread, by the inode of the placeholder.
     static KEPT: RefCell<BTreeMap<u64, Kept>> = const { RefCell::new(BTreeMap::new()) };
@@ -128,6 +130,8 @@ pub(crate) struct Kept {
     pub(crate) socket: Virtual,
     /// Options of the placeholder at the last takeover.
     pub(crate) before: Vec<Setting>,
+    /// Changes for multicast that wait for the bind of a new UDP socket.
+    pub(crate) early: Vec<MulticastChange>,
     /// Number of descriptors of the placeholder. Stays 1 where nobody sees descriptors being duplicated and closed.
     pub(crate) descriptors: u32,
     /// `true` if the program has shut down reading: without bytes, reading then returns the end of the stream.
@@ -138,7 +142,7 @@ pub(crate) struct Kept {
 /// can come back.
 pub(crate) fn insert(of: Numbered<'_>, socket: Virtual, before: Vec<Setting>) {
     let Some(bed) = cohaptic_sockets::bed() else { return };
-    let mut kept = Kept { bed: Arc::downgrade(&bed), socket, before, descriptors: 1, is_read_shut: false };
+    let mut kept = Kept { bed: Arc::downgrade(&bed), socket, before, early: Vec::new(), descriptors: 1, is_read_shut: false };
     let gone: Vec<Kept> = KEPT.with_borrow_mut(|all| {
         // Sockets of ended test beds are removed whenever the table grows, so that the table does not grow from run to run.
         let old: Vec<u64> = all.iter().filter(|(_, kept)| kept.bed.strong_count() == 0).map(|(inode, _)| *inode).collect();

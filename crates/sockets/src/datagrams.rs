@@ -2,10 +2,10 @@
 
 use std::fmt;
 use std::io;
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::task::{Context, Poll};
 
-use crate::Configured;
+use crate::{Configured, Version};
 
 /// Option of a UDP socket. Flags are 0 or 1.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -24,38 +24,39 @@ pub enum DatagramOption {
     MulticastLoop4,
     /// Reception of the socket's own multicast over IPv6, a flag.
     MulticastLoop6,
+    /// Limit of hops of multicast over IPv6.
+    MulticastHops,
+    /// Interface for multicast over IPv4, as the 32 bits of its address; 0 if the host chooses.
+    MulticastInterface4,
+    /// Number of the interface for multicast over IPv6; 0 if the host chooses.
+    MulticastInterface6,
+}
+
+/// Interface of a host, as programs name interfaces.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Interface {
+    /// Address of IPv4; the unspecified address for any.
+    Address(Ipv4Addr),
+    /// Number of the interface; 0 for any.
+    Number(u32),
 }
 
 /// Change of the membership in a multicast group.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Membership {
-    /// Joins a multicast group of IPv4.
-    Join4 {
+    /// Joins a multicast group.
+    Join {
         /// Address of the group.
-        group: Ipv4Addr,
-        /// Address of the interface.
-        interface: Ipv4Addr,
+        group: IpAddr,
+        /// Interface by which the group is joined.
+        interface: Interface,
     },
-    /// Leaves a multicast group of IPv4.
-    Leave4 {
+    /// Leaves a multicast group.
+    Leave {
         /// Address of the group.
-        group: Ipv4Addr,
-        /// Address of the interface.
-        interface: Ipv4Addr,
-    },
-    /// Joins a multicast group of IPv6.
-    Join6 {
-        /// Address of the group.
-        group: Ipv6Addr,
-        /// Number of the interface; 0 for any.
-        interface: u32,
-    },
-    /// Leaves a multicast group of IPv6.
-    Leave6 {
-        /// Address of the group.
-        group: Ipv6Addr,
-        /// Number of the interface; 0 for any.
-        interface: u32,
+        group: IpAddr,
+        /// Interface by which the group was joined.
+        interface: Interface,
     },
 }
 
@@ -116,6 +117,8 @@ pub trait Datagrams: Configured + fmt::Debug + Send + Sync {
     fn option(&self, option: DatagramOption) -> io::Result<u32>;
     /// Sets the value of an option.
     fn set_option(&self, option: DatagramOption, value: u32) -> io::Result<()>;
+    /// Selects the interface for multicast over a version of IP.
+    fn select_interface(&self, version: Version, interface: Interface) -> io::Result<()>;
     /// Joins or leaves a multicast group.
     fn change_membership(&self, membership: Membership) -> io::Result<()>;
 }

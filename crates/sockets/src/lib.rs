@@ -31,7 +31,7 @@ use std::panic::Location;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-pub use datagrams::{DatagramOption, Datagrams, Membership, Received, Sending};
+pub use datagrams::{DatagramOption, Datagrams, Interface, Membership, Received, Sending};
 pub use outside::{Outside, catches_calls, outside};
 pub use settings::{Configured, KeepaliveTimes, Setting};
 pub use streams::{ByteStream, Connecting, Flag, Listener, Number, Ready, Socket, Stream};

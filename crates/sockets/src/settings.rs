@@ -34,8 +34,12 @@ pub enum Setting {
     Broadcast(bool),
     /// `IP_MULTICAST_TTL`.
     MulticastTtl(u32),
-    /// `IP_MULTICAST_LOOP`, or `IPV6_MULTICAST_LOOP` of a socket of IPv6.
-    MulticastLoop(bool),
+    /// `IPV6_MULTICAST_HOPS`.
+    MulticastHops(u32),
+    /// `IP_MULTICAST_LOOP`.
+    MulticastLoop4(bool),
+    /// `IPV6_MULTICAST_LOOP`.
+    MulticastLoop6(bool),
 }
 
 /// Times of keep-alive probes.

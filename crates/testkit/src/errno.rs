@@ -26,6 +26,10 @@ pub(crate) enum Errno {
     TooLong,
     /// `EPROTOTYPE`.
     WrongType,
+    /// `ENOPROTOOPT`.
+    NoSuchOption,
+    /// `EOPNOTSUPP`.
+    NotSupported,
     /// `EAFNOSUPPORT`.
     OtherVersion,
     /// `EADDRINUSE`.
@@ -61,6 +65,8 @@ impl Errno {
             Self::NoDestination => 89,
             Self::TooLong => 90,
             Self::WrongType => 91,
+            Self::NoSuchOption => 92,
+            Self::NotSupported => 95,
             Self::OtherVersion => 97,
             Self::AddrInUse => 98,
             Self::AddrNotAvailable => 99,
@@ -87,6 +93,8 @@ impl Errno {
             Self::NoDestination => 39,
             Self::TooLong => 40,
             Self::WrongType => 41,
+            Self::NoSuchOption => 42,
+            Self::NotSupported => 45,
             Self::OtherVersion => 47,
             Self::AddrInUse => 48,
             Self::AddrNotAvailable => 49,
@@ -114,6 +122,8 @@ impl Errno {
             Self::InvalidInput => 10_022,
             Self::NoDestination => 10_039,
             Self::TooLong => 10_040,
+            Self::NoSuchOption => 10_042,
+            Self::NotSupported => 10_045,
             Self::OtherVersion => 10_047,
             Self::AddrInUse => 10_048,
             Self::AddrNotAvailable => 10_049,

@@ -110,6 +110,7 @@ mod facade;
 mod failure;
 mod fault;
 mod file;
+mod groups;
 pub mod hit;
 mod host;
 #[cfg(feature = "hyper")]

@@ -109,6 +109,93 @@ fn multicast_has_the_options_of_the_placeholder() {
     });
 }
 
+/// `setsockopt` with bytes.
+fn set(socket: &impl AsRawFd, level: i32, name: i32, value: &[u8]) -> std::io::Result<()> {
+    // SAFETY: the value is valid for reading its length.
+    let outcome = unsafe { libc::setsockopt(socket.as_raw_fd(), level, name, value.as_ptr().cast(), u32::try_from(value.len()).unwrap()) };
+    if outcome == 0 { Ok(()) } else { Err(std::io::Error::last_os_error()) }
+}
+
+fn number<T: std::fmt::Debug>(outcome: std::io::Result<T>) -> i32 {
+    outcome.unwrap_err().raw_os_error().unwrap()
+}
+
+/// Before the bind and after, groups of both versions are joined in the test bed, and interfaces are those of the host.
+#[test]
+fn groups_and_interfaces_are_those_of_the_host() {
+    run(async |bed: Bed| {
+        let client = bed.host("client").spawn(async {
+            let group: std::net::Ipv6Addr = "ff02::fb".parse().unwrap();
+            let socket = Socket::new(Domain::IPV6, Type::DGRAM, None).unwrap();
+            socket.set_nonblocking(true).unwrap();
+            assert_eq!(number(socket.join_multicast_v6(&group, 99)), libc::ENODEV);
+            socket.join_multicast_v6(&group, 0).unwrap();
+            assert_eq!(number(socket.join_multicast_v6(&group, 0)), libc::EADDRINUSE);
+            assert_eq!(number(socket.set_multicast_if_v6(99)), libc::ENODEV);
+            socket.set_multicast_if_v6(2).unwrap();
+            assert_eq!(socket.multicast_if_v6().unwrap(), 2);
+            socket.set_multicast_hops_v6(0).unwrap();
+            socket.bind(&"[::]:5353".parse::<SocketAddr>().unwrap().into()).unwrap();
+            assert_eq!((socket.multicast_if_v6().unwrap(), socket.multicast_hops_v6().unwrap()), (2, 0));
+            let socket = UdpSocket::from(socket);
+            let mut buffer = [0; 9];
+            socket.send_to(b"all", (group, 5353)).unwrap();
+            assert_eq!(socket.recv_from(&mut buffer).unwrap(), (3, "[fd00::1]:5353".parse().unwrap()));
+            socket.set_multicast_loop_v6(false).unwrap();
+            socket.send_to(b"all", (group, 5353)).unwrap();
+            assert_eq!(socket.recv(&mut buffer).unwrap_err().kind(), ErrorKind::WouldBlock);
+            // The loop of IPv4 is another option of the same socket.
+            socket.join_multicast_v4(&Ipv4Addr::new(224, 0, 0, 251), &Ipv4Addr::UNSPECIFIED).unwrap();
+            socket.send_to(b"all", "[::ffff:224.0.0.251]:5353").unwrap();
+            assert_eq!(socket.recv(&mut buffer).unwrap(), 3);
+            socket.leave_multicast_v6(&group, 0).unwrap();
+            assert_eq!(number(socket.leave_multicast_v6(&group, 0)), libc::EADDRNOTAVAIL);
+            let four = bind("0.0.0.0:0");
+            assert_eq!(number(four.join_multicast_v6(&group, 0)), libc::ENOPROTOOPT);
+            assert_eq!(number(SockRef::from(&four).multicast_if_v6()), libc::EOPNOTSUPP);
+        });
+        client.await.unwrap();
+    });
+}
+
+/// `IP_MULTICAST_IF` takes an `in_addr`, an `ip_mreq` or an `ip_mreqn`, and `IP_ADD_MEMBERSHIP` the last two: outcomes as measured with Linux.
+#[test]
+fn an_interface_of_ipv4_is_named_in_three_ways() {
+    run(async |bed: Bed| {
+        let client = bed.host("client").spawn(async {
+            let (none, own, other) = ([0; 4], [10, 0, 0, 1], [10, 0, 0, 9]);
+            let select = |value: &[&[u8]]| {
+                let socket = Socket::new(Domain::IPV4, Type::DGRAM, None).unwrap();
+                let outcome = set(&socket, libc::IPPROTO_IP, libc::IP_MULTICAST_IF, &value.concat());
+                outcome.map_err(|error| error.raw_os_error().unwrap()).map(|()| socket.multicast_if_v4().unwrap().octets())
+            };
+            let (any, two, many) = (0_u32.to_ne_bytes(), 2_u32.to_ne_bytes(), 99_u32.to_ne_bytes());
+            assert_eq!(select(&[&own]), Ok(own));
+            assert_eq!(select(&[&other]), Err(libc::EADDRNOTAVAIL));
+            assert_eq!(select(&[&none]), Ok(none));
+            assert_eq!(select(&[&[127, 0, 0, 1]]), Ok([127, 0, 0, 1]));
+            assert_eq!(select(&[&[224, 0, 0, 1], &own]), Ok(own));
+            assert_eq!(select(&[&none, &none, &two]), Ok(none));
+            assert_eq!(select(&[&none, &none, &many]), Err(libc::EADDRNOTAVAIL));
+            assert_eq!(select(&[&none, &own, &any]), Ok(own));
+            assert_eq!(select(&[&own, b"abc"]), Ok(own));
+            assert_eq!(select(&[b"ab"]), Err(libc::EINVAL));
+
+            let socket = bind("0.0.0.0:5353");
+            SockRef::from(&socket).set_multicast_if_v4(&Ipv4Addr::from(own)).unwrap();
+            assert_eq!(SockRef::from(&socket).multicast_if_v4().unwrap().octets(), own);
+            let join = |value: &[&[u8]]| set(&socket, libc::IPPROTO_IP, libc::IP_ADD_MEMBERSHIP, &value.concat());
+            join(&[&[224, 0, 0, 9], &other, &two]).unwrap();
+            assert_eq!(number(join(&[&[224, 0, 0, 9], &own])), libc::EADDRINUSE);
+            assert_eq!(number(join(&[&[224, 0, 0, 8], &own, &many])), libc::ENODEV);
+            assert_eq!(number(join(&[&[224, 0, 0, 8], b"abc"])), libc::EINVAL);
+            socket.send_to(b"all", "224.0.0.9:5353").unwrap();
+            assert_eq!(socket.recv(&mut [0; 9]).unwrap(), 3);
+        });
+        client.await.unwrap();
+    });
+}
+
 #[test]
 fn errors_have_the_numbers_of_linux() {
     run(async |bed: Bed| {

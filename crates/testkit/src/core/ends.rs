@@ -1,11 +1,13 @@
 //! Addresses and ports of both ends of a packet, packed into 16 bytes because the event queue moves them with the packet.
 
-use std::net::{IpAddr, SocketAddr};
+use std::net::{IpAddr, SocketAddr, SocketAddrV6};
+use std::num::NonZeroU8;
 
 use cohaptic_wan::{Path, flow_number};
 
 use super::bound::Port;
 use crate::address::Addresses;
+use crate::groups::Group;
 use crate::wire::{Form, HasFlow};
 
 /// Returns the address of IPv4 as a socket of IPv6 shows it; an address of IPv6 as it is.
@@ -16,10 +18,15 @@ pub(crate) fn mapped(address: SocketAddr) -> SocketAddr {
     }
 }
 
-/// Returns the address of IPv4 for an address such as `::ffff:10.0.0.1`, and all other addresses unchanged.
+/// Returns the address of IPv4 for an address such as `::ffff:10.0.0.1`. Of other addresses of IPv6 the flow label goes, and the number of the interface except
+/// for groups.
 #[inline]
 pub(crate) fn unmapped(address: SocketAddr) -> SocketAddr {
-    if address.is_ipv4() { address } else { SocketAddr::new(address.ip().to_canonical(), address.port()) }
+    match address {
+        SocketAddr::V4(_) => address,
+        SocketAddr::V6(six) if six.ip().is_multicast() => SocketAddrV6::new(*six.ip(), six.port(), 0, six.scope_id()).into(),
+        SocketAddr::V6(six) => SocketAddr::new(six.ip().to_canonical(), six.port()),
+    }
 }
 
 /// Both ends of a packet, and the kind of the packet.
@@ -36,6 +43,8 @@ pub(crate) struct Ends {
     /// `true` if a socket of IPv6 has received the packet over IPv4, so that its program sees the addresses as `::ffff:10.0.0.1` (RFC 4291, section 2.5.5.2).
     pub(super) is_mapped: bool,
     pub(super) kind: Kind,
+    /// Flags and scope of the group of IPv6 to which the packet goes; `None` for all other receivers. See [`Group`].
+    pub(super) scope: Option<NonZeroU8>,
 }
 
 /// Kind of a packet.
@@ -59,7 +68,7 @@ impl Ends {
 
     /// Like [`Ends::new`], but takes short addresses.
     pub(super) const fn of([from, to]: [u32; 2], [from_port, to_port]: [u16; 2], is_six: bool, kind: Kind) -> Self {
-        Self { from, to, from_port, to_port, is_six, is_mapped: false, kind }
+        Self { from, to, from_port, to_port, is_six, is_mapped: false, kind, scope: None }
     }
 
     /// Returns the port of the receiver, with the version of IP.
@@ -77,7 +86,8 @@ impl Ends {
     /// Returns the address of the receiver, as the receiving program sees it.
     #[inline]
     pub(super) fn to(&self) -> SocketAddr {
-        self.shown(SocketAddr::new(Addresses::long(self.to, self.is_six), self.to_port))
+        let ip = if self.scope.is_some() { self.group().map(Group::address) } else { None };
+        self.shown(SocketAddr::new(ip.unwrap_or_else(|| Addresses::long(self.to, self.is_six)), self.to_port))
     }
 
     #[inline]
@@ -93,7 +103,12 @@ impl Ends {
 
     /// Returns whether the packet goes to a multicast group.
     pub(super) const fn is_multicast(&self) -> bool {
-        !self.is_six && Addresses::is_multicast(self.to)
+        self.scope.is_some() || !self.is_six && Addresses::is_multicast(self.to)
+    }
+
+    /// Returns the multicast group to which the packet goes.
+    pub(super) fn group(&self) -> Option<Group> {
+        self.is_multicast().then_some(Group { short: self.to, scope: self.scope })
     }
 
     /// Returns whether the packet goes to a broadcast address.
@@ -113,7 +128,8 @@ impl HasFlow for Ends {
     fn flow(&self, _path: Path) -> u32 {
         let addresses = u64::from(self.from) << 32 | u64::from(self.to);
         let ports = u64::from(self.from_port) << 16 | u64::from(self.to_port);
-        flow_number(&[addresses, (self.kind as u64) << 33 | u64::from(self.is_six) << 32 | ports])
+        let scope = self.scope.map_or(0, |scope| u64::from(scope.get()));
+        flow_number(&[addresses, scope << 40 | (self.kind as u64) << 33 | u64::from(self.is_six) << 32 | ports])
     }
 
     fn form(&self) -> Form {
@@ -145,6 +161,12 @@ mod tests {
             let back = ends.back(Kind::Unreachable);
             assert_eq!((back.from(), back.to(), back.kind), (to, from, Kind::Unreachable));
         }
+        let group = Group::of("ff02::fb".parse().unwrap()).unwrap();
+        let ends = Ends::of([1, group.short], [1, 5353], true, Kind::Datagram);
+        // The identifier of the group is the number of a host, too.
+        assert_eq!((ends.to().to_string(), ends.group()), ("[fd00::fb]:5353".to_owned(), None));
+        let ends = Ends { scope: group.scope, ..ends };
+        assert_eq!((ends.to().to_string(), ends.group()), ("[ff02::fb]:5353".to_owned(), Some(group)));
         assert_eq!(size_of::<Ends>(), 16);
     }
 }

@@ -30,6 +30,7 @@ use cohaptic_wan::{LinkModel, NodeId, Path};
 
 use crate::address::{self, AddressPlan};
 use crate::current;
+use crate::groups::Group;
 use crate::link::LinkChange;
 use crate::middlebox::Topology;
 use crate::names::Names;
@@ -43,6 +44,7 @@ pub(crate) use ends::{mapped, unmapped};
 use face::Face;
 use forwarding::Forwarding;
 pub(crate) use forwarding::shown;
+pub(crate) use multicast::{Interface, Sending};
 use sockets::Sockets;
 use waking::Woken;
 
@@ -235,8 +237,8 @@ struct HostState {
     is_idle: bool,
     /// Sockets of the host, by port.
     bound: Bound,
-    /// Multicast groups that sockets of the host have joined, in short form. A group stands here once for each socket.
-    groups: Vec<u32>,
+    /// Multicast groups that sockets of the host have joined. A group stands here once for each membership of a socket.
+    groups: Vec<Group>,
     /// Offset from [`FIRST_DYNAMIC`](sockets::FIRST_DYNAMIC) of the port to try next for a socket that asks for no particular port.
     next_port: u16,
 }

@@ -2,6 +2,7 @@
 
 use std::io;
 use std::net::{IpAddr, SocketAddr};
+use std::num::NonZeroU8;
 
 use cohaptic_units::Ecn;
 use cohaptic_wan::{NodeId, Path};
@@ -10,6 +11,7 @@ use super::socket_state::SocketState;
 use super::{Core, Ends, Kind, Parcel, SocketId};
 use crate::address::Addresses;
 use crate::errno::Errno;
+use crate::groups::Group;
 use crate::trace::Lost;
 use crate::wire::{Arrival, Held};
 
@@ -53,6 +55,8 @@ pub(super) struct Route {
     from: u32,
     /// Address on the packet, as [`Addresses::short`]. Differs from the address of the program's call if the latter is unspecified.
     pub(super) to: u32,
+    /// Flags and scope, if the receivers are a group of IPv6.
+    scope: Option<NonZeroU8>,
     receivers: Receivers,
 }
 
@@ -86,7 +90,7 @@ impl Core {
         }
         let (host, from_port) = (socket.host, socket.port.number());
         let at = match from {
-            None => socket.at,
+            None => socket.source_at(),
             Some(from) => Some(self.named_source(host, from, is_six)?),
         };
         match self.plan.owner_of(number, is_six) {
@@ -110,9 +114,10 @@ impl Core {
     /// Sends a datagram that does not go to another host alone: to its own host, to all hosts, or to nobody.
     #[inline(never)]
     fn send_within(&mut self, id: SocketId, route: Route, ports: [u16; 2], is_six: bool, bytes: &[u8], ecn: Ecn) {
-        let Route { from, to, receivers } = route;
+        let Route { from, to, scope, receivers } = route;
         let host = self.sockets.get(id).host;
-        let parcel = self.spare.copied(Ends::of([from, to], ports, is_six, Kind::Datagram), bytes, ecn);
+        let ends = Ends { scope, ..Ends::of([from, to], ports, is_six, Kind::Datagram) };
+        let parcel = self.spare.copied(ends, bytes, ecn);
         match receivers {
             Receivers::One => self.hand_over(host, parcel),
             Receivers::All => {
@@ -151,14 +156,20 @@ impl Core {
         // An address of a host belongs to no other kind of address. Most datagrams go to such an address, so the other kinds are tried only afterwards.
         let mut number = Addresses::short(to.ip());
         if self.plan.owner_of(number, to.is_ipv6()).is_some() {
-            return Ok(Route { from: self.source_to_host(socket.host, at, number, to)?, to: number, receivers: Receivers::One });
+            return Ok(Route { from: self.source_to_host(socket.host, at, number, to)?, to: number, scope: None, receivers: Receivers::One });
+        }
+        if to.ip().is_multicast() {
+            let group = Group::parse(to.ip())?;
+            let zone = if let SocketAddr::V6(to) = to { to.scope_id() } else { 0 };
+            let from = self.source_to_group(socket, at, group, zone)?;
+            return Ok(Route { from, to: group.short, scope: group.scope, receivers: Receivers::Group });
         }
         let receivers = self.other_receivers(socket.host, to, &mut number)?;
         let from = self.source(socket.host, at, number, to)?;
         if matches!(receivers, Receivers::All) && !socket.may_broadcast {
             return Errno::PermissionDenied.fail();
         }
-        Ok(Route { from, to: number, receivers })
+        Ok(Route { from, to: number, scope: None, receivers })
     }
 
     /// Returns the source address of a socket at `at` that sends to the address `number` of a host, given by the program as `to`. Unlike with [`Core::source`], the
@@ -169,7 +180,7 @@ impl Core {
             None => Ok(self.plan.short(host, to.is_ipv6())),
             // As with Linux, the address of a group is no source.
             Some(at) if !to.is_ipv6() && Addresses::is_multicast(at) => Ok(self.plan.short(host, false)),
-            Some(at) => self.check_source(host, at, number, to).map(|()| at),
+            Some(at) => self.check_source(host, at, number, to.is_ipv6()).map(|()| at),
         }
     }
 
@@ -177,13 +188,6 @@ impl Core {
     /// unspecified address.
     fn other_receivers(&self, host: NodeId, to: &SocketAddr, number: &mut u32) -> io::Result<Receivers> {
         let ip = to.ip();
-        if ip.is_multicast() {
-            let no_groups = || {
-                let text = format!("{to} is a multicast address of IPv6, and a test bed has groups of IPv4 alone; use one of 224.0.0.0/4");
-                Err(io::Error::new(io::ErrorKind::Unsupported, text))
-            };
-            return if ip.is_ipv4() { Ok(Receivers::Group) } else { no_groups() };
-        }
         if ip.is_unspecified() {
             *number = Addresses::LOOPBACK[usize::from(ip.is_ipv6())];
             return Ok(Receivers::One);
@@ -204,7 +208,7 @@ impl Core {
         match at {
             None => Ok(self.source_to(host, number, to.is_ipv6())),
             Some(at) if !to.is_ipv6() && Addresses::is_multicast(at) => Ok(self.source_to(host, number, false)),
-            Some(at) => self.check_source(host, at, number, to).map(|()| at),
+            Some(at) => self.check_source(host, at, number, to.is_ipv6()).map(|()| at),
         }
     }
 
@@ -216,11 +220,11 @@ impl Core {
 
     /// Checks that a socket bound to the address `at` can send to the address `number`.
     #[inline(never)]
-    fn check_source(&self, host: NodeId, at: u32, number: u32, to: &SocketAddr) -> io::Result<()> {
-        let (addresses, bound) = (self.plan.of(host), Addresses::long(at, to.is_ipv6()));
-        let is_owned = self.plan.has(host, at, to.is_ipv6());
+    pub(super) fn check_source(&self, host: NodeId, at: u32, number: u32, is_six: bool) -> io::Result<()> {
+        let (addresses, bound) = (self.plan.of(host), Addresses::long(at, is_six));
+        let is_owned = self.plan.has(host, at, is_six);
         // As with Linux, a socket at 127.0.0.1 or `::1` reaches its own host alone.
-        let stays = Addresses::is_loopback(number, to.is_ipv6()) || self.plan.has(host, number, to.is_ipv6());
+        let stays = Addresses::is_loopback(number, is_six) || self.plan.has(host, number, is_six);
         if bound.is_loopback() && !stays {
             return Errno::InvalidInput.fail();
         }
@@ -394,6 +398,10 @@ impl Core {
     /// Returns whether `host` has the address to which the packet goes.
     #[inline(always)]
     fn has_address(&self, host: NodeId, ends: &Ends) -> bool {
+        // The identifier of a group of IPv6 may equal the short form of a host's address.
+        if ends.scope.is_some() {
+            return self.is_member(host, ends);
+        }
         self.plan.short(host, ends.is_six) == ends.to
             || ends.is_to_any_host()
             || self.plan.is_of_interface(host, ends.to, ends.is_six)

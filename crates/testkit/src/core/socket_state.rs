@@ -2,7 +2,8 @@
 
 use std::collections::VecDeque;
 use std::io;
-use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, SocketAddrV6};
+use std::num::NonZeroU8;
 
 use cohaptic_units::Instant;
 use cohaptic_wan::NodeId;
@@ -13,6 +14,7 @@ use super::waking::{Waiters, Woken};
 use super::{Ends, Parcel, SocketName, mapped, unmapped};
 use crate::address::Addresses;
 use crate::errno::Errno;
+use crate::groups::Group;
 use crate::trace::Lost;
 use crate::wire::Held;
 
@@ -25,7 +27,7 @@ impl Parcel {
 
     /// Returns the address to which the datagram was sent.
     #[cfg(any(feature = "facade", feature = "quinn"))]
-    pub(crate) fn to(&self) -> std::net::IpAddr {
+    pub(crate) fn to(&self) -> IpAddr {
         self.addresses.to().ip()
     }
 
@@ -50,6 +52,8 @@ pub(crate) struct SocketState {
     pub(super) host: NodeId,
     /// Address to which the socket is bound, as [`Addresses::short`]; `None` if the socket is bound to all addresses of its host.
     pub(super) at: Option<u32>,
+    /// Flags and scope of the group of IPv6 to which the socket is bound: see [`Group`]. `None` for all other addresses.
+    pub(super) scope: Option<NonZeroU8>,
     pub(super) port: Port,
     /// Peer of a connected socket, with the address on packets: of IPv4 also if the socket is of IPv6.
     pub(super) peer: Option<SocketAddr>,
@@ -120,12 +124,23 @@ impl SocketState {
     /// Returns the local address of the socket.
     pub(super) fn local(&self) -> SocketAddr {
         let (is_six, number) = (self.port.is_six(), self.port.number());
+        if let Some(at) = self.at.filter(|_| self.scope.is_some())
+            && let IpAddr::V6(group) = (Group { short: at, scope: self.scope }).address()
+        {
+            let zone = self.multicast.as_deref().map_or(0, |multicast| multicast.zone);
+            return SocketAddrV6::new(group, number, 0, zone).into();
+        }
         let ip = match self.at {
             Some(at) => Addresses::long(at, is_six),
             None if is_six => Ipv6Addr::UNSPECIFIED.into(),
             None => Ipv4Addr::UNSPECIFIED.into(),
         };
         SocketAddr::new(ip, number)
+    }
+
+    /// Returns whether the socket is bound to `ip`, alone or among all addresses.
+    pub(super) fn is_at(&self, ip: IpAddr) -> bool {
+        self.at.is_none() || self.local().ip() == ip
     }
 
     /// Returns whether the socket is bound to all addresses of both versions of IP.
@@ -144,6 +159,13 @@ impl SocketState {
         if self.port.is_six() { mapped(address) } else { address }
     }
 
+    /// Returns the address from which the socket sends, as [`Addresses::short`]; `None` if the host chooses. As with Linux, the address of a group is no
+    /// source.
+    #[inline]
+    pub(super) fn source_at(&self) -> Option<u32> {
+        if self.scope.is_some() { None } else { self.at }
+    }
+
     /// Returns whether [`SocketState::wire_form`] surely returns the same address.
     #[inline]
     pub(super) const fn is_wire_form(&self, to: &SocketAddr) -> bool {
@@ -153,7 +175,7 @@ impl SocketState {
     /// Returns whether the socket receives a datagram between these ends, which goes to the port and the host of the socket.
     #[inline]
     pub(super) fn hears(&self, ends: &Ends) -> bool {
-        self.at.is_none_or(|at| at == ends.to) && self.peer.is_none_or(|peer| peer == ends.from())
+        self.at.is_none_or(|at| at == ends.to && self.scope == ends.scope) && self.peer.is_none_or(|peer| peer == ends.from())
     }
 
     /// Returns the address of the other end of a packet of this socket. A mapped address such as `::ffff:10.0.0.1` becomes an address of IPv4, because packets

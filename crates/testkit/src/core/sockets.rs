@@ -10,11 +10,13 @@ use cohaptic_units::print::Seconds;
 use cohaptic_wan::NodeId;
 
 use super::bound::{Port, SocketId};
+use super::multicast::Multicast;
 use super::socket_state::SocketState;
 use super::waking::Waiters;
 use super::{Core, Parcel};
 use crate::address::Addresses;
 use crate::errno::Errno;
+use crate::groups::Group;
 use crate::wire::Held;
 
 /// Sockets that have not been closed.
@@ -63,17 +65,25 @@ impl Core {
     /// Binds a socket of a host, which must be up. Port 0 of `wanted` stands for any free dynamic port.
     pub(crate) fn bind(&mut self, host: NodeId, wanted: SocketAddr) -> io::Result<SocketId> {
         let ip = wanted.ip();
-        self.check_owned(host, ip)?;
+        // As with Linux, a socket can be bound to the address of a group, and then hears this group alone.
+        let group = Group::of(ip).filter(|group| group.scope.is_some());
+        let zone = match (group, wanted) {
+            (Some(group), SocketAddr::V6(wanted)) => self.zone_of(host, group, wanted.scope_id())?,
+            _ => self.check_owned(host, ip).map(|()| 0)?,
+        };
         let port = match wanted.port() {
             0 => self.free_port(host, ip)?,
             port if self.is_taken(host, ip, port) => return Errno::AddrInUse.fail(),
             port => port,
         };
-        let (at, port) = ((!ip.is_unspecified()).then(|| Addresses::short(ip)), Port::new(ip.is_ipv6(), port));
+        let short = group.map_or_else(|| Addresses::short(ip), |group| group.short);
+        let (at, port) = ((!ip.is_unspecified()).then_some(short), Port::new(ip.is_ipv6(), port));
+        let multicast = (zone != 0).then(|| Box::new(Multicast::of_zone(zone)));
         let (readers, inbox, room) = (Waiters::default(), VecDeque::new(), self.settings.receive_buffer);
         let state = SocketState {
             host,
             at,
+            scope: group.and_then(|group| group.scope),
             port,
             peer: None,
             room,
@@ -83,7 +93,7 @@ impl Core {
             readers,
             refused: false,
             may_broadcast: false,
-            multicast: None,
+            multicast,
             died: None,
         };
         let bound = &mut self.hosts[host.index()].bound;
@@ -96,7 +106,6 @@ impl Core {
 
     /// Checks that a socket of `host` can be bound to the address `ip`.
     pub(super) fn check_owned(&self, host: NodeId, ip: IpAddr) -> io::Result<()> {
-        // As with Linux, a socket can be bound to the address of a group, and then hears this group alone.
         let is_group = ip.is_ipv4() && ip.is_multicast();
         if ip.is_unspecified() || is_group || self.plan.is_own(host, Addresses::short(ip), ip.is_ipv6()) {
             Ok(())
@@ -108,9 +117,8 @@ impl Core {
     fn is_taken(&self, host: NodeId, ip: IpAddr, port: u16) -> bool {
         let bound = &self.hosts[host.index()].bound;
         // A socket bound to all addresses conflicts with every socket of the port. At `[::]` these are the sockets of both versions of IP.
-        let is_taken = bound
-            .at(Port::new(ip.is_ipv6(), port))
-            .is_some_and(|at| at.all().any(|id| ip.is_unspecified() || self.sockets.get(id).at.is_none_or(|other| other == Addresses::short(ip))));
+        let is_taken =
+            bound.at(Port::new(ip.is_ipv6(), port)).is_some_and(|at| at.all().any(|id| ip.is_unspecified() || self.sockets.get(id).is_at(ip)));
         is_taken || ip == IpAddr::V6(Ipv6Addr::UNSPECIFIED) && bound.at(Port::new(false, port)).is_some()
     }
 
@@ -181,10 +189,23 @@ impl Core {
         let socket = self.sockets.get(id);
         let to = socket.wire_form(peer)?;
         // The route is asked for its errors: a peer to which no datagram could be sent is refused here, and not at the first send.
-        let route = self.route(socket, socket.at, &to)?;
+        // As with Linux, a group of a link needs an interface in its address, or in the settings of the socket.
+        if let SocketAddr::V6(to) = to
+            && to.scope_id() == 0
+            && socket.sending(true).interface == 0
+            && Group::of(IpAddr::V6(*to.ip())).is_some_and(Group::needs_interface)
+        {
+            return Errno::InvalidInput.fail();
+        }
+        let route = self.route(socket, socket.source_at(), &to)?;
         // As with Linux, the unspecified address stands for loopback. Datagrams of the peer come from there.
         let ip = if to.ip().is_unspecified() { Addresses::long(route.to, to.is_ipv6()) } else { to.ip() };
-        self.sockets.get_mut(id).peer = Some(SocketAddr::new(ip, to.port()));
+        let mut peer = SocketAddr::new(ip, to.port());
+        if let (SocketAddr::V6(peer), SocketAddr::V6(to)) = (&mut peer, to) {
+            // The interface of a group is asked again at each datagram.
+            peer.set_scope_id(if ip.is_multicast() { to.scope_id() } else { 0 });
+        }
+        self.sockets.get_mut(id).peer = Some(peer);
         Ok(())
     }
 

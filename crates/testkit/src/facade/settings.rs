@@ -52,7 +52,9 @@ impl Configured for TcpStream {
             | Setting::OnlyV6(_)
             | Setting::Broadcast(_)
             | Setting::MulticastTtl(_)
-            | Setting::MulticastLoop(_) => Ok(()),
+            | Setting::MulticastHops(_)
+            | Setting::MulticastLoop4(_)
+            | Setting::MulticastLoop6(_) => Ok(()),
         }
     }
 }
@@ -86,7 +88,9 @@ impl Configured for TcpListener {
             | Setting::OnlyV6(_)
             | Setting::Broadcast(_)
             | Setting::MulticastTtl(_)
-            | Setting::MulticastLoop(_) => {}
+            | Setting::MulticastHops(_)
+            | Setting::MulticastLoop4(_)
+            | Setting::MulticastLoop6(_) => {}
         })
     }
 }
@@ -97,10 +101,15 @@ impl Configured for UdpSocket {
     }
 
     fn settings(&self) -> io::Result<Vec<Setting>> {
-        let multicast = [Setting::MulticastTtl(self.multicast_ttl_v4()?), Setting::MulticastLoop(self.multicast_loop_v4()?)];
+        let multicast = [Setting::MulticastTtl(self.multicast_ttl_v4()?), Setting::MulticastLoop4(self.multicast_loop_v4()?)];
+        let six = match self.version() {
+            Version::Four => None,
+            Version::Six => Some([Setting::MulticastHops(self.multicast_hops_v6()?), Setting::MulticastLoop6(self.multicast_loop_v6()?)]),
+        };
         Ok([Setting::Ttl(self.ttl()?), Setting::TypeOfService(self.tos_v4()?), Setting::Broadcast(self.broadcast()?)]
             .into_iter()
             .chain(multicast)
+            .chain(six.into_iter().flatten())
             .collect())
     }
 
@@ -113,7 +122,9 @@ impl Configured for UdpSocket {
             Setting::Ttl(ttl) => self.set_ttl(ttl),
             Setting::Broadcast(on) => self.set_broadcast(on),
             Setting::MulticastTtl(ttl) => self.set_multicast_ttl_v4(ttl),
-            Setting::MulticastLoop(on) => self.set_multicast_loop_v4(on),
+            Setting::MulticastHops(hops) => self.set_multicast_hops_v6(hops),
+            Setting::MulticastLoop4(on) => self.set_multicast_loop_v4(on),
+            Setting::MulticastLoop6(on) => self.set_multicast_loop_v6(on),
             Setting::NoDelay(_)
             | Setting::Keepalive(_)
             | Setting::Linger(_)
@@ -154,7 +165,11 @@ impl Configured for TcpSocket {
             Setting::ReuseAddress(on) => self.set_reuseaddr(on),
             Setting::ReusePort(on) => self.set_reuseport(on),
             Setting::OnlyV6(on) => self.set_only_v6(on),
-            Setting::Broadcast(_) | Setting::MulticastTtl(_) | Setting::MulticastLoop(_) => Ok(()),
+            Setting::Broadcast(_)
+            | Setting::MulticastTtl(_)
+            | Setting::MulticastHops(_)
+            | Setting::MulticastLoop4(_)
+            | Setting::MulticastLoop6(_) => Ok(()),
         }
     }
 }

@@ -1,14 +1,14 @@
 //! Implementation of the trait of UDP sockets of `cohaptic-sockets`: see [`crate::facade`].
 
 use std::io;
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::task::{Context, Poll};
 
-use cohaptic_sockets::{DatagramOption, Datagrams, Membership, Received, Sending};
+use cohaptic_sockets::{DatagramOption, Datagrams, Interface, Membership, Received, Sending, Version};
 use cohaptic_units::Ecn;
 
 use super::{KIND, UdpSocket};
-use crate::core::Parcel;
+use crate::core::{self, Parcel};
 
 impl Datagrams for UdpSocket {
     fn poll_receive(&self, cx: &mut Context<'_>, peek: bool, take: &mut dyn FnMut(Received<'_>)) -> Poll<io::Result<()>> {
@@ -58,6 +58,9 @@ impl Datagrams for UdpSocket {
             DatagramOption::MulticastTtl => self.multicast_ttl_v4(),
             DatagramOption::MulticastLoop4 => self.multicast_loop_v4().map(u32::from),
             DatagramOption::MulticastLoop6 => self.multicast_loop_v6().map(u32::from),
+            DatagramOption::MulticastHops => self.multicast_hops_v6(),
+            DatagramOption::MulticastInterface4 => self.multicast_if_v4().map(Ipv4Addr::to_bits),
+            DatagramOption::MulticastInterface6 => self.multicast_if_v6(),
         }
     }
 
@@ -70,16 +73,28 @@ impl Datagrams for UdpSocket {
             DatagramOption::MulticastTtl => self.set_multicast_ttl_v4(value),
             DatagramOption::MulticastLoop4 => self.set_multicast_loop_v4(value != 0),
             DatagramOption::MulticastLoop6 => self.set_multicast_loop_v6(value != 0),
+            DatagramOption::MulticastHops => self.set_multicast_hops_v6(value),
+            DatagramOption::MulticastInterface4 => self.set_multicast_if_v4(&Ipv4Addr::from_bits(value)),
+            DatagramOption::MulticastInterface6 => self.set_multicast_if_v6(value),
         }
+    }
+
+    fn select_interface(&self, version: Version, interface: Interface) -> io::Result<()> {
+        self.set_multicast_interface(version == Version::Six, named(interface))
     }
 
     fn change_membership(&self, membership: Membership) -> io::Result<()> {
         match membership {
-            Membership::Join4 { group, interface } => self.join_multicast_v4(group, interface),
-            Membership::Leave4 { group, interface } => self.leave_multicast_v4(group, interface),
-            Membership::Join6 { group, interface } => self.join_multicast_v6(&group, interface),
-            Membership::Leave6 { group, interface } => self.leave_multicast_v6(&group, interface),
+            Membership::Join { group, interface } => self.join_group(group, named(interface)),
+            Membership::Leave { group, interface } => self.leave_group(group, named(interface)),
         }
+    }
+}
+
+const fn named(interface: Interface) -> core::Interface {
+    match interface {
+        Interface::Address(address) => core::Interface::Address(address),
+        Interface::Number(number) => core::Interface::Number(number),
     }
 }
 

@@ -2,6 +2,7 @@
 
 #[cfg(feature = "facade")]
 mod facade;
+mod multicast;
 mod options;
 mod receiving;
 mod sending;

@@ -1,7 +1,6 @@
 //! Options of a socket, and tokio's methods that wait for readiness.
 
 use std::io;
-use std::net::{Ipv4Addr, Ipv6Addr};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use cohaptic_units::Ecn;
@@ -43,10 +42,6 @@ fn set(option: &AtomicU32, value: u32, allowed: std::ops::RangeInclusive<u32>) -
     }
     option.store(value, Ordering::Relaxed);
     Ok(())
-}
-
-fn no_groups<T>() -> io::Result<T> {
-    Err(io::Error::new(io::ErrorKind::Unsupported, "a test bed has multicast groups of IPv4 alone: join one of 224.0.0.0/4"))
 }
 
 impl UdpSocket {
@@ -152,102 +147,6 @@ impl UdpSocket {
     /// If `class` is out of range, or the host of the socket has crashed.
     pub fn set_tclass_v6(&self, class: u32) -> io::Result<()> {
         self.set_tos_v4(class)
-    }
-
-    /// Returns the time to live of multicast over IPv4. The default is 1, as with Linux.
-    ///
-    /// # Errors
-    ///
-    /// If the host of the socket has crashed.
-    pub fn multicast_ttl_v4(&self) -> io::Result<u32> {
-        self.open(|core| core.multicast(self.id).ttl)
-    }
-
-    /// Sets the time to live of multicast over IPv4, from 0 to 255. With 0 a datagram reaches the own host alone. All other values mean the network of the
-    /// host: a test bed has no multicast routers.
-    ///
-    /// # Errors
-    ///
-    /// If `ttl` is out of range, or the host of the socket has crashed.
-    pub fn set_multicast_ttl_v4(&self, ttl: u32) -> io::Result<()> {
-        if ttl > 255 {
-            return Errno::InvalidInput.fail();
-        }
-        self.open(|core| core.multicast(self.id).ttl = ttl)
-    }
-
-    /// Returns whether sockets of the own host hear the multicast of this socket over IPv4. The default is `true`, as with Linux.
-    ///
-    /// # Errors
-    ///
-    /// If the host of the socket has crashed.
-    pub fn multicast_loop_v4(&self) -> io::Result<bool> {
-        self.open(|core| core.multicast(self.id).loops)
-    }
-
-    /// Sets whether sockets of the own host hear the multicast of this socket over IPv4.
-    ///
-    /// # Errors
-    ///
-    /// If the host of the socket has crashed.
-    pub fn set_multicast_loop_v4(&self, on: bool) -> io::Result<()> {
-        self.open(|core| core.multicast(self.id).loops = on)
-    }
-
-    /// Returns whether the socket would receive its own multicast over IPv6. The value is that of IPv4, because a test bed has no groups of IPv6.
-    ///
-    /// # Errors
-    ///
-    /// If the host of the socket has crashed.
-    pub fn multicast_loop_v6(&self) -> io::Result<bool> {
-        self.multicast_loop_v4()
-    }
-
-    /// Sets whether the socket would receive its own multicast over IPv6: see [`UdpSocket::multicast_loop_v6`].
-    ///
-    /// # Errors
-    ///
-    /// If the host of the socket has crashed.
-    pub fn set_multicast_loop_v6(&self, on: bool) -> io::Result<()> {
-        self.set_multicast_loop_v4(on)
-    }
-
-    /// Joins a multicast group. Datagrams of hosts in the same network to the group then reach the sockets of this host that are bound to the port, and to all
-    /// addresses or to the address of the group. `interface` is an address of the host, or unspecified. The membership ends with the socket.
-    ///
-    /// # Errors
-    ///
-    /// As on Linux: `EINVAL` if `group` is no multicast address, `ENODEV` if the host does not have the address `interface`, `EADDRINUSE` if the socket has
-    /// joined the group already.
-    pub fn join_multicast_v4(&self, group: Ipv4Addr, interface: Ipv4Addr) -> io::Result<()> {
-        self.open(|core| core.join_group(self.id, group, interface))?
-    }
-
-    /// Fails: a test bed has no multicast groups of IPv6.
-    ///
-    /// # Errors
-    ///
-    /// Always [`io::ErrorKind::Unsupported`].
-    pub fn join_multicast_v6(&self, _group: &Ipv6Addr, _interface: u32) -> io::Result<()> {
-        no_groups()
-    }
-
-    /// Leaves a multicast group.
-    ///
-    /// # Errors
-    ///
-    /// As [`UdpSocket::join_multicast_v4`]; `EADDRNOTAVAIL` if the socket has not joined the group.
-    pub fn leave_multicast_v4(&self, group: Ipv4Addr, interface: Ipv4Addr) -> io::Result<()> {
-        self.open(|core| core.leave_group(self.id, group, interface))?
-    }
-
-    /// Fails: a test bed has no multicast groups of IPv6.
-    ///
-    /// # Errors
-    ///
-    /// Always [`io::ErrorKind::Unsupported`].
-    pub fn leave_multicast_v6(&self, _group: &Ipv6Addr, _interface: u32) -> io::Result<()> {
-        no_groups()
     }
 
     /// Waits until the socket is ready for one of the interests. A socket is always ready to send.

@@ -5,9 +5,11 @@ use std::panic::catch_unwind;
 use std::time::Duration;
 
 use cohaptic_testkit::hit::Verdict;
-use cohaptic_testkit::node::{Node, Nodes, Packet, Transmit};
+use cohaptic_testkit::node::{Nodes, Transmit};
 use cohaptic_testkit::wan::{DropCause, Fate};
 use cohaptic_testkit::{Bed, Happening, Instant, Lost, Record, Testbed, UdpSocket, time};
+
+use crate::once::Once;
 
 /// Returns the instant `count` microseconds after the beginning.
 const fn us(count: u64) -> Instant {
@@ -191,26 +193,13 @@ fn a_host_has_a_modulator_of_its_own_for_both_directions() {
     assert!(up.iter().zip(&other_up).any(|(one, other)| one.abs_diff(*other) > 1), "{up:?} {other_up:?}");
 }
 
-#[derive(Default)]
-struct Once {
-    sends: Option<Transmit>,
-    came: Option<Instant>,
-}
-
-impl Node for Once {
-    fn handle_packet(&mut self, now: Instant, _packet: Packet) {
-        self.came = Some(now);
-    }
-
-    fn poll_transmit(&mut self, _now: Instant) -> Option<Transmit> {
-        self.sends.take()
-    }
-}
-
 #[test]
 fn nodes_have_access_lines_too() {
-    let sender = Once { sends: Some(Transmit::to(1, [0; 75].to_vec())), came: None };
-    let mut run = Nodes::new().add("phone", sender).add("server", Once::default()).access("phone", "devtools/slow-4g").start();
+    let mut run = Nodes::new()
+        .add("phone", Once::sending(Transmit::to(1, [0; 75].to_vec())))
+        .add("server", Once::default())
+        .access("phone", "devtools/slow-4g")
+        .start();
     run.run_until_idle();
     assert_eq!(run.node::<Once>("server").came, Some(us(75_800)));
     assert_eq!(run.access_stats("phone").unwrap().uplink.delivered(), 1);

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
-use cohaptic_sockets::{Call, DatagramOption, Datagrams, Flag, Membership, Number, Socket, Stop, Stream, Version};
+use cohaptic_sockets::{Call, DatagramOption, Datagrams, Flag, Interface, Membership, Number, Socket, Stop, Stream, Version};
 use cohaptic_testkit::tcp::TcpConfig;
 use cohaptic_testkit::{Bed, Testbed, time};
 
@@ -110,23 +110,32 @@ fn each_option_is_set() {
                     (DatagramOption::TrafficClass, 16),
                     (DatagramOption::MulticastTtl, 9),
                     (DatagramOption::MulticastLoop4, 0),
-                    (DatagramOption::MulticastLoop6, 1),
+                    (DatagramOption::MulticastInterface4, Ipv4Addr::LOCALHOST.to_bits()),
                 ];
-                for (option, value) in options {
+                let of_six = [(DatagramOption::MulticastHops, 9), (DatagramOption::MulticastLoop6, 0), (DatagramOption::MulticastInterface6, 2)];
+                if version == Version::Four {
+                    for (option, value) in of_six {
+                        assert!(socket.option(option).is_err() && socket.set_option(option, value).is_err(), "{option:?}");
+                    }
+                }
+                for (option, value) in options.into_iter().chain(of_six.into_iter().filter(|_| version == Version::Six)) {
                     assert_ne!(socket.option(option).unwrap(), value, "{option:?}");
                     socket.set_option(option, value).unwrap();
                     assert_eq!(socket.option(option).unwrap(), value, "{option:?}");
                 }
                 let (four, six) = (Ipv4Addr::new(224, 0, 0, 1), Ipv6Addr::new(0xff02, 0, 0, 0, 0, 0, 0, 1));
-                let any = Ipv4Addr::UNSPECIFIED;
-                for membership in [Membership::Join4 { group: four, interface: any }, Membership::Leave4 { group: four, interface: any }] {
-                    socket.change_membership(membership).unwrap();
-                    // The second time it is an error, as with Linux.
-                    assert!(socket.change_membership(membership).is_err(), "{membership:?}");
+                let groups = [(four.into(), Interface::Address(Ipv4Addr::UNSPECIFIED)), (six.into(), Interface::Number(0))];
+                for (group, interface) in groups {
+                    for membership in [Membership::Join { group, interface }, Membership::Leave { group, interface }] {
+                        let has_groups = group.is_ipv4() || version == Version::Six;
+                        assert_eq!(socket.change_membership(membership).is_ok(), has_groups, "{membership:?}");
+                        // The second time it is an error, as with Linux.
+                        assert!(socket.change_membership(membership).is_err(), "{membership:?}");
+                    }
                 }
-                for membership in [Membership::Join6 { group: six, interface: 0 }, Membership::Leave6 { group: six, interface: 0 }] {
-                    assert!(socket.change_membership(membership).unwrap_err().to_string().contains("groups of IPv4 alone"), "{membership:?}");
-                }
+                socket.select_interface(Version::Four, Interface::Number(2)).unwrap();
+                assert_eq!(socket.option(DatagramOption::MulticastInterface4).unwrap(), 0, "a number is no address");
+                assert!(socket.select_interface(Version::Four, Interface::Number(3)).is_err());
 
                 let socket = self::socket(version);
                 for flag in [Flag::KeepAlive, Flag::ReuseAddress, Flag::ReusePort, Flag::NoDelay] {

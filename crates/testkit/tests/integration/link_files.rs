@@ -5,8 +5,10 @@ use std::panic::catch_unwind;
 use std::path::Path;
 use std::time::Duration;
 
-use cohaptic_testkit::node::{Node, Nodes, Packet, Transmit};
+use cohaptic_testkit::node::{Nodes, Transmit};
 use cohaptic_testkit::{Instant, LinkFile, LinkFileError, Testbed, ToLink, time};
+
+use crate::once::Once;
 
 fn file(folder: &Path, name: &str, text: &str) -> std::path::PathBuf {
     let path = folder.join(name);
@@ -100,28 +102,11 @@ fn a_file_that_makes_no_sense_fails_the_test_with_its_place() {
     assert!(LinkFile::parse("a -> b: replay x.csv").unwrap_err().to_string().starts_with("1:16: a text without a file of its own cannot name files"));
 }
 
-/// Sends once, at the beginning, to the one that was added after it; keeps when something came.
-#[derive(Default)]
-struct Once {
-    sends: Option<Transmit>,
-    came: Option<Instant>,
-}
-
-impl Node for Once {
-    fn handle_packet(&mut self, now: Instant, _packet: Packet) {
-        self.came = Some(now);
-    }
-
-    fn poll_transmit(&mut self, _now: Instant) -> Option<Transmit> {
-        self.sends.take()
-    }
-}
-
 #[test]
 fn nodes_take_the_links_of_a_file_by_name() {
     let base = tempfile::tempdir().unwrap();
     let path = file(base.path(), "two.links", "b -> a: delay 7ms\na -> b: delay 3ms\n");
-    let sender = || Once { sends: Some(Transmit::to(1, "x")), came: None };
+    let sender = || Once::sending(Transmit::to(1, "x"));
     let mut run = Nodes::new().add("a", sender()).add("b", Once::default()).links_from_file(&path).start();
     run.run_until_idle();
     assert_eq!(run.node::<Once>("b").came, Some(Instant::from_nanos(3_000_000)));

@@ -10,7 +10,8 @@ const GROUP: Ipv4Addr = Ipv4Addr::new(224, 0, 0, 251);
 const ANY: Ipv4Addr = Ipv4Addr::UNSPECIFIED;
 const TO: &str = "224.0.0.251:5353";
 
-async fn hears(socket: &UdpSocket) -> bool {
+/// Returns whether a datagram arrives within 100 ms.
+pub(crate) async fn hears(socket: &UdpSocket) -> bool {
     time::timeout(Duration::from_millis(100), socket.recv_from(&mut [0; 8])).await.is_ok_and(|heard| heard.is_ok())
 }
 

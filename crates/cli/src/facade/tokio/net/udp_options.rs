@@ -3,7 +3,7 @@
 use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr};
 
-use cohaptic_sockets::{DatagramOption, Membership};
+use cohaptic_sockets::{DatagramOption, Interface, Membership};
 
 use super::super::{Either, either};
 use super::UdpSocket;
@@ -77,7 +77,11 @@ impl UdpSocket {
 
     /// See `tokio::net::UdpSocket::join_multicast_v4`.
     pub fn join_multicast_v4(&self, group: Ipv4Addr, interface: Ipv4Addr) -> io::Result<()> {
-        either!(&self.0, |socket| socket.join_multicast_v4(group, interface), socket.change_membership(Membership::Join4 { group, interface }))
+        either!(
+            &self.0,
+            |socket| socket.join_multicast_v4(group, interface),
+            socket.change_membership(Membership::Join { group: group.into(), interface: Interface::Address(interface) })
+        )
     }
 
     /// See `tokio::net::UdpSocket::join_multicast_v6`.
@@ -85,13 +89,17 @@ impl UdpSocket {
         either!(
             &self.0,
             |socket| socket.join_multicast_v6(group, interface),
-            socket.change_membership(Membership::Join6 { group: *group, interface })
+            socket.change_membership(Membership::Join { group: (*group).into(), interface: Interface::Number(interface) })
         )
     }
 
     /// See `tokio::net::UdpSocket::leave_multicast_v4`.
     pub fn leave_multicast_v4(&self, group: Ipv4Addr, interface: Ipv4Addr) -> io::Result<()> {
-        either!(&self.0, |socket| socket.leave_multicast_v4(group, interface), socket.change_membership(Membership::Leave4 { group, interface }))
+        either!(
+            &self.0,
+            |socket| socket.leave_multicast_v4(group, interface),
+            socket.change_membership(Membership::Leave { group: group.into(), interface: Interface::Address(interface) })
+        )
     }
 
     /// See `tokio::net::UdpSocket::leave_multicast_v6`.
@@ -99,7 +107,7 @@ impl UdpSocket {
         either!(
             &self.0,
             |socket| socket.leave_multicast_v6(group, interface),
-            socket.change_membership(Membership::Leave6 { group: *group, interface })
+            socket.change_membership(Membership::Leave { group: (*group).into(), interface: Interface::Number(interface) })
         )
     }
 }
