@@ -40,14 +40,10 @@ pub(super) fn fit(arrivals: &[(f64, f64)], scores: &[f64], spacing: f64, before:
     let span = arrivals.last()?.0 - arrivals.first()?.0;
     let (least, greatest) = ((0.5 * spacing).ln(), span.ln());
     // A level that outlasts the measurement is the mean, not a memory.
-    let likelihood = |steps: &[[f64; 2]], [log_time, logit]: [f64; 2]| {
-        if (least..=greatest).contains(&log_time) { log_likelihood(steps, log_time.exp(), share_of(logit)) } else { f64::NEG_INFINITY }
+    let likelihood = |[log_time, logit]: [f64; 2]| {
+        if (least..=greatest).contains(&log_time) { log_likelihood(&steps, log_time.exp(), share_of(logit)) } else { f64::NEG_INFINITY }
     };
-    let looked_at = &steps[..steps.len().min(LOOKED_AT)];
-    let times = (0..TIMES).map(|place| least + (greatest - least) * f64::from(place) / f64::from(TIMES));
-    let starts = times.flat_map(|log_time| SHARES.map(|share| [log_time, (share / (1.0 - share)).ln()]));
-    let start = starts.map(|start| (start, likelihood(looked_at, start))).max_by(|one, other| one.1.total_cmp(&other.1))?.0;
-    let (at, log_likelihood) = climb(start, [0.3, 0.3], |at| likelihood(&steps, at))?;
+    let (at, log_likelihood) = climb(start(&steps, [least, greatest])?, [0.3, 0.3], likelihood)?;
     let likelihood_ratio = 2.0 * log_likelihood;
     let (time_s, share) = (at[0].exp(), share_of(at[1]));
     if likelihood_ratio - before < CLEARLY || share > LARGEST {
@@ -71,6 +67,16 @@ pub(super) fn fit(arrivals: &[(f64, f64)], scores: &[f64], spacing: f64, before:
         likelihood_ratio,
     };
     Some((fit, innovations))
+}
+
+/// Returns ln τ and ln(s/(1 − s)) at which the search starts: of a grid with ln τ from `least` on and below `greatest`, the point at which the first
+/// [`LOOKED_AT`] arrivals are most likely.
+fn start(steps: &[[f64; 2]], [least, greatest]: [f64; 2]) -> Option<[f64; 2]> {
+    let looked_at = &steps[..steps.len().min(LOOKED_AT)];
+    let times = (0..TIMES).map(|place| least + (greatest - least) * f64::from(place) / f64::from(TIMES));
+    let starts = times.flat_map(|log_time| SHARES.map(|share| [log_time, (share / (1.0 - share)).ln()]));
+    let likelihoods = starts.map(|start| (start, log_likelihood(looked_at, start[0].exp(), share_of(start[1]))));
+    likelihoods.max_by(|one, other| one.1.total_cmp(&other.1)).map(|(start, _)| start)
 }
 
 /// Returns the share s of ln(s/(1 − s)).
@@ -231,6 +237,44 @@ mod tests {
         for (left, has_share) in [(quantile + 0.1, true), (quantile - 0.1, false)] {
             assert_eq!(fit(&arrivals, &scores, 0.008, gain - left).is_some(), has_share, "{left}");
         }
+    }
+
+    /// Returns the steps of arrivals with a memory, and the scores of these arrivals alone.
+    fn steps(seed: u64, packets: usize, memory: (f64, f64), even: bool) -> Vec<[f64; 2]> {
+        let arrivals = arrivals_with_loss(0.0, seed, packets, memory, even);
+        let scores = correlation::normal_scores(&arrivals.iter().map(|arrival| arrival.1).collect::<Vec<_>>());
+        let mut last = 0.0;
+        arrivals.iter().zip(scores).map(|(arrival, score)| [arrival.0 - std::mem::replace(&mut last, arrival.0), score]).collect()
+    }
+
+    /// The memory changes after 10 000 and after 20 000 packets, so that more packets or fewer would give another start.
+    #[test]
+    fn the_search_starts_from_the_first_20_000_arrivals() {
+        let parts = [(1, 10_000, (0.5, 0.9)), (2, 10_000, (0.02, 0.5)), (3, 60_000, (2.0, 0.3))];
+        let all: Vec<_> = parts.into_iter().flat_map(|(seed, packets, memory)| steps(seed, packets, memory, true)).collect();
+        let begins = |steps: &[[f64; 2]]| start(steps, [0.004_f64.ln(), 640_f64.ln()]).unwrap();
+        assert_eq!(begins(&all), begins(&all[..20_000]));
+        assert_ne!(begins(&all), begins(&all[..10_000]));
+        assert_ne!(begins(&all), begins(&all[20_000..]));
+    }
+
+    /// The start is the nearest point of the grid: two times are a factor of 1.9 apart, and two shares 0.2.
+    #[test]
+    fn the_search_starts_near_the_memory() {
+        for (seed, time, share) in [(1, 0.005, 0.9), (2, 0.05, 0.1), (3, 0.3, 0.5), (4, 2.0, 0.3), (5, 30.0, 0.7)] {
+            let [log_time, logit] = start(&steps(seed, 20_000, (time, share), false), [0.004_f64.ln(), 160_f64.ln()]).unwrap();
+            assert!((log_time - f64::ln(time)).abs() < 0.7 && (share_of(logit) - share).abs() < 0.21, "{} {}", log_time.exp(), share_of(logit));
+        }
+    }
+
+    /// Times from the spacing of the packets to a large part of the measurement are found, if the gaps or the length allow.
+    #[test]
+    fn short_and_long_times_are_found() {
+        let short = correlation::fit(&arrivals(1, 20_000, (0.006, 0.8), false), 0.008).unwrap().0;
+        assert!(short.share < 1.0 && (short.time_s / 0.006).ln().abs() < 0.5, "{short:?}");
+        // The measurement takes 160 s, and has few times of a slow level: the estimates scatter.
+        let long = (0..6).map(|seed| correlation::fit(&arrivals(seed, 20_000, (80.0, 0.9), true), 0.008).unwrap().0);
+        assert!(long.into_iter().any(|fit| fit.share < 1.0 && fit.time_s > 16.0));
     }
 
     /// A level that drifts for the whole measurement of 16 s has no time of its own: the time is no longer than the measurement.
