@@ -205,8 +205,10 @@ impl<P, T: Clone> Line<P, T> {
         Some(at)
     }
 
-    /// Counts the arrival of further packets of a train, with the instants of [`Line::deliver`].
+    /// Counts the arrival of further packets of a train, with the instants of [`Line::deliver`]. Not inlined, because the compiler would otherwise compute the
+    /// sums of a train for each packet.
     #[cold]
+    #[inline(never)]
     pub(crate) fn deliver_further(&mut self, packets: u64, entered: Instant, at: Instant) {
         self.flow.deliver_train(packets, entered, at);
     }

@@ -53,7 +53,7 @@ impl SizeAndMarks {
 
     pub(super) fn new(info: PacketInfo) -> Self {
         // Larger sizes saturate, so the shift below loses no bit.
-        let size = u32::try_from(info.size.get()).unwrap_or(u32::MAX).min(Self::MOST);
+        let size = u32::try_from(info.size.get().min(u64::from(Self::MOST))).unwrap_or(Self::MOST);
         Self(Self::NOTHING.0 | size << 10 | u32::from(info.ecn.bits()) << 7)
     }
 
