@@ -71,7 +71,7 @@ fn plan() -> impl Strategy<Value = Plan> {
         .prop_map(|(network, writes, rest, reads, nodelay, config, event, at)| Plan { network, writes, rest, reads, nodelay, config, event, at })
 }
 
-/// What programs have seen, in their order.
+/// Observations of programs, in the order of time.
 #[derive(Clone, Default)]
 struct Log(Rc<RefCell<Vec<String>>>);
 
@@ -143,7 +143,7 @@ fn happen(bed: &Bed, event: Event, is_over: bool) {
     }
 }
 
-/// Runs the plan and returns what was seen: by the programs, and of connections and links every 7 ms.
+/// Runs the plan and returns the observations: of its programs, and every 7 ms of connections and links.
 async fn program(bed: Bed, plan: Plan) -> Vec<String> {
     let log = Log::default();
     let (accepted, log_of, plan_of, bed_of) = (Rc::new(RefCell::new(Vec::new())), log.clone(), plan.clone(), bed.clone());
