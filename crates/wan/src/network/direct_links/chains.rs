@@ -66,6 +66,8 @@ impl Chains {
                 });
                 ([chain.p, chain.r], [certain[0]?, certain[1]?])
             }
+            // The probabilities of a chain in time follow from the time between packets.
+            Losses::InTime(_) => return None,
         };
         Some(Self { leaves: leaves.map(threshold), loses: loses.map(threshold), delays: delays.clone(), cubics: delays.cubics()? })
     }

@@ -3,7 +3,7 @@
 use cohaptic_units::Instant;
 
 use super::chains::Chains;
-use super::losses::{Losses, Verdict};
+use super::losses::{InTime, Losses, Verdict};
 use crate::laws::delay::Law;
 use crate::line::direct::Words;
 use crate::random::{PacketDraws, Purpose, Stream};
@@ -20,13 +20,15 @@ pub(super) struct Kind {
     pub(super) is_random: bool,
     /// `true` if no packet arrives before an earlier packet. The latest arrival stands with the counters of each link.
     pub(super) keeps_order: bool,
-    loss: Losses,
+    pub(super) loss: Losses,
     delay: Delays,
-    line: Line,
+    pub(super) line: Line,
     /// Computation for eight links at once; `None` without correlated delays, with a rate, or where [`Chains::new`] returns `None`.
     pub(super) chains: Option<Chains>,
-    /// `true` if the links have no state, and delays that are best drawn for several links at once.
+    /// `true` if delays are best drawn for several links at once.
     pub(super) draws_jointly: bool,
+    /// `true` if links of this kind have state.
+    pub(super) remembers: bool,
 }
 
 /// The transmitter of a link and its queue, for packets of one size.
@@ -49,10 +51,11 @@ enum Delays {
 pub(super) struct Remembered {
     /// Instant at which the previous packet leaves the queue.
     departure: Instant,
-    /// Latest value of the chain of delays, NaN before the first packet, and its instant where the correlation depends on time.
+    /// Latest value of the chain of delays, NaN before the first packet.
     normal: f64,
-    normal_at: Instant,
-    state: GilbertElliottState,
+    /// Instant of the latest value or state of the chain that depends on time; the end of time before the first packet.
+    at: Instant,
+    pub(super) state: GilbertElliottState,
     /// Packets without room in the queue.
     pub(super) found_full: u64,
 }
@@ -64,14 +67,15 @@ impl Kind {
             Loss::None => Losses::None,
             Loss::Independent(probability) => Losses::Independent(*probability),
             Loss::GilbertElliott(chain) => Losses::GilbertElliott(*chain),
-            Loss::Correlated(_) | Loss::GilbertElliottInTime(_) | Loss::FourState(_) | Loss::Pattern(_) => return None,
+            Loss::GilbertElliottInTime(chain) => Losses::InTime(InTime::new(*chain)),
+            Loss::Correlated(_) | Loss::FourState(_) | Loss::Pattern(_) => return None,
         };
         let delay = match CorrelatedDelays::new(&config.delay) {
             Some(correlated) => Delays::Correlated(correlated),
             None => Delays::Independent(DelayStage::new(&config.delay)),
         };
-        // Outages have state beyond `Remembered`.
-        if !config.outages.is_empty() {
+        // Outages have state beyond `Remembered`, which has one instant for a chain of losses or a chain of delays.
+        if !config.outages.is_empty() || matches!((&loss, &delay), (Losses::InTime(_), Delays::Correlated(_))) {
             return None;
         }
         let line = Line::new(config, load)?;
@@ -81,14 +85,28 @@ impl Kind {
             (Delays::Correlated(delays), Line::Free(0)) if !keeps_order => Chains::new(&loss, delays),
             (Delays::Correlated(_) | Delays::Independent(_), _) => None,
         };
-        let is_from_normal = matches!(&delay, Delays::Independent(delay) if delay.is_from_normal());
-        let kind = Self { is_random: config.is_random(), keeps_order, loss, delay, line, chains, draws_jointly: false };
-        Some(Self { draws_jointly: is_from_normal && !kind.remembers(), ..kind })
+        let remembers = matches!(line, Line::Queued(_))
+            || matches!(loss, Losses::GilbertElliott(_) | Losses::InTime(_))
+            || matches!(delay, Delays::Correlated(_));
+        let draws_jointly = match &delay {
+            Delays::Independent(delay) => delay.is_from_normal() && !remembers,
+            // The delays begin together only where no packet waits.
+            Delays::Correlated(delays) => delays.is_from_normal() && matches!(line, Line::Free(_)),
+        };
+        Some(Self { is_random: config.is_random(), keeps_order, loss, delay, line, chains, draws_jointly, remembers })
     }
 
-    /// Returns whether links of this kind have state.
-    pub(super) const fn remembers(&self) -> bool {
-        matches!(self.line, Line::Queued(_)) || matches!(self.loss, Losses::GilbertElliott(_)) || matches!(self.delay, Delays::Correlated(_))
+    /// Returns whether links that take turns between this kind and others need no more state than [`Remembered`]: a chain of delays, or a chain of losses
+    /// from packet to packet, would have to begin anew with each turn.
+    pub(super) const fn takes_turns(&self) -> bool {
+        matches!(self.delay, Delays::Independent(_)) && !matches!(self.loss, Losses::GilbertElliott(_))
+    }
+
+    /// Begins a turn of this kind at an instant, after a turn of `before`. A chain of losses goes on where the kind before has one too.
+    pub(super) fn begin_turn(&mut self, at: Instant, before: &Losses) {
+        if let Losses::InTime(chain) = &mut self.loss {
+            chain.since = if let Losses::InTime(before) = before { before.since } else { at };
+        }
     }
 
     /// Returns the state of a link before its first packet.
@@ -100,7 +118,8 @@ impl Kind {
     pub(super) fn initial_state(&self, draws: Stream) -> GilbertElliottState {
         match &self.loss {
             Losses::GilbertElliott(chain) => chain.stationary_state(draws.packet(0).first(Purpose::InitialState)),
-            Losses::None | Losses::Independent(_) => GilbertElliottState::Good,
+            // A chain in time draws its first state with the first packet.
+            Losses::None | Losses::Independent(_) | Losses::InTime(_) => GilbertElliottState::Good,
         }
     }
 
@@ -143,13 +162,8 @@ impl Kind {
 
     /// Computes the fate of a packet of a link with the state `link`, and changes the state.
     #[inline(always)]
-    pub(super) fn verdict(&mut self, now: Instant, link: &mut Remembered, [loss_word, jitter_word]: Words, packet: PacketDraws) -> Verdict {
-        let is_lost = match &self.loss {
-            Losses::None => false,
-            Losses::Independent(probability) => probability.happens(loss_word),
-            Losses::GilbertElliott(chain) => chain.loses(&mut link.state, loss_word, || packet.more(Purpose::Loss).next_word()),
-        };
-        if is_lost {
+    pub(super) fn verdict(&mut self, now: Instant, link: &mut Remembered, words: Words, packet: PacketDraws) -> Verdict {
+        if self.loses(now, link, words, packet) {
             return Verdict::Lost;
         }
         // Lost packets take no time to transmit, because losses come before the queue.
@@ -163,18 +177,82 @@ impl Kind {
                 }
             },
         };
-        let delay = match &mut self.delay {
-            Delays::Independent(delay) => delay.draw_nanos(leaves, jitter_word, packet),
-            Delays::Correlated(delays) => delays.draw_nanos(leaves, (&mut link.normal, &mut link.normal_at), jitter_word, packet),
-        };
-        Verdict::Arrives(leaves.saturating_add_nanos(delay))
+        Verdict::Arrives(self.arrival(leaves, link, words, packet))
+    }
+
+    /// Returns whether a packet of a link with the state `link` is lost, and changes the state.
+    #[inline(always)]
+    pub(super) fn loses(&mut self, now: Instant, link: &mut Remembered, [word, _]: Words, packet: PacketDraws) -> bool {
+        match &mut self.loss {
+            Losses::None => false,
+            Losses::Independent(probability) => probability.happens(word),
+            Losses::GilbertElliott(chain) => chain.loses(&mut link.state, word, || packet.more(Purpose::Loss).next_word()),
+            Losses::InTime(chain) => link.loses_in_time(now, chain, word, packet),
+        }
+    }
+
+    /// Returns the next values of the chains of delays of several links with these states, for packets that are offered `now`, and the delays \[ns\], or
+    /// [`Law::UNKNOWN`] where [`Kind::verdict`] must draw the delay.
+    #[inline(always)]
+    pub(super) fn delays_of_chains<const N: usize>(&self, now: Instant, links: &[Remembered], words: &[Words; N]) -> ([f64; N], [u64; N]) {
+        let (Delays::Correlated(delays), Line::Free(time)) = (&self.delay, self.line) else { return ([0.0; N], [Law::UNKNOWN; N]) };
+        let (mut of_jitter, mut chains) = ([0; N], [(f64::NAN, Instant::MAX); N]);
+        for ((of_jitter, chain), ([_, word], link)) in of_jitter.iter_mut().zip(&mut chains).zip(words.iter().zip(links)) {
+            (*of_jitter, *chain) = (*word, (link.normal, link.at));
+        }
+        delays.nanos_at_once(now.saturating_add_nanos(time), &chains, &of_jitter)
+    }
+
+    /// Computes the fate of a packet like [`Kind::verdict`], with a value of the chain of delays and a delay \[ns\] that are known.
+    #[inline(always)]
+    pub(super) fn verdict_of_known(
+        &mut self,
+        now: Instant,
+        link: &mut Remembered,
+        words: Words,
+        packet: PacketDraws,
+        (value, nanos): (f64, u64),
+    ) -> Verdict {
+        if self.loses(now, link, words, packet) {
+            return Verdict::Lost;
+        }
+        let Line::Free(time) = self.line else { unreachable!("delays behind a queue are drawn singly") };
+        let leaves = now.saturating_add_nanos(time);
+        if nanos == Law::UNKNOWN {
+            return Verdict::Arrives(self.arrival(leaves, link, words, packet));
+        }
+        (link.normal, link.at) = (value, leaves);
+        Verdict::Arrives(leaves.saturating_add_nanos(nanos))
+    }
+
+    /// Returns the arrival of a packet that leaves the transmitter at `leaves`, without the order of packets.
+    #[inline(always)]
+    pub(super) fn arrival(&mut self, leaves: Instant, link: &mut Remembered, [_, word]: Words, packet: PacketDraws) -> Instant {
+        leaves.saturating_add_nanos(match &mut self.delay {
+            Delays::Independent(delay) => delay.draw_nanos(leaves, word, packet),
+            Delays::Correlated(delays) => delays.draw_nanos(leaves, (&mut link.normal, &mut link.at), word, packet),
+        })
     }
 }
 
 impl Remembered {
     /// The state of a link without state.
     pub(super) const NOTHING: Self =
-        Self { departure: Instant::ZERO, normal: f64::NAN, normal_at: Instant::ZERO, state: GilbertElliottState::Good, found_full: 0 };
+        Self { departure: Instant::ZERO, normal: f64::NAN, at: Instant::MAX, state: GilbertElliottState::Good, found_full: 0 };
+
+    /// Returns whether a packet is lost by a chain in time, and moves the chain. Not inlined, because few links have such a chain.
+    #[inline(never)]
+    fn loses_in_time(&mut self, now: Instant, chain: &mut InTime, word: u64, packet: PacketDraws) -> bool {
+        let is_known = self.at != Instant::MAX && self.at >= chain.since;
+        let bad = if is_known {
+            chain.bad_after(now.saturating_duration_since(self.at), self.state == GilbertElliottState::Bad)
+        } else {
+            chain.chain.bad_at_first()
+        };
+        let bad = bad.happens(word);
+        (self.state, self.at) = (if bad { GilbertElliottState::Bad } else { GilbertElliottState::Good }, now);
+        chain.chain.loses_in(bad, || packet.more(Purpose::Loss).next_word())
+    }
 }
 
 impl Line {

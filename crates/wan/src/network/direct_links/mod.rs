@@ -2,6 +2,7 @@
 
 mod chains;
 mod kind;
+mod kinds;
 mod losses;
 mod switching;
 
@@ -11,6 +12,7 @@ use cohaptic_units::Instant;
 
 use chains::ChainStates;
 use kind::{Kind, Line, Remembered};
+use kinds::Kinds;
 use losses::Verdict;
 use switching::Switching;
 
@@ -22,7 +24,6 @@ use crate::line::direct::{Direct, Words};
 use crate::line::model::LinkModel;
 use crate::line::name::LinkName;
 use crate::random::Stream;
-use crate::stages::config::LinkConfig;
 use crate::stages::queue::Load;
 
 /// Links with the arrival of a packet known at its offer. Possible parts are outages, loss, a tail-drop queue before a transmitter of constant rate, a queue of
@@ -41,8 +42,8 @@ pub struct DirectLinks {
     until: Instant,
     load: Load,
     links: Vec<LinkState>,
-    /// Configurations of kinds of links, and the data shared by links of one kind. Indexed by the number in [`Memory`].
-    kinds: Vec<(LinkConfig, Kind)>,
+    /// Kinds of links, and the data shared by the links of one model. Indexed by the number in [`Memory`].
+    kinds: Vec<Kinds>,
     /// State of each link, indexed by link. Shorter than `links`, or empty, if the last links, or all links, need no such state.
     remembered: Vec<Remembered>,
     /// State of links in [`Memory::Chained`], indexed by link.
@@ -62,6 +63,9 @@ pub struct Arrivals {
     pub arrive: u8,
     /// Bits of the links with a packet arriving before an earlier packet. A subset of `arrive`.
     pub overtake: u8,
+    /// Bits of the links with a packet that waits, for the order of packets: the packet arrives together with an earlier packet. A subset of `arrive`. Links
+    /// that are not computed together may have no bit for a packet that waits.
+    pub wait: u8,
     /// Number of each packet on its link, from 0.
     pub sequences: [u64; DirectLinks::AT_ONCE],
     /// Arrival of each packet. Without meaning where the bit in `arrive` is clear.
@@ -82,12 +86,12 @@ struct LinkState {
     memory: Memory,
 }
 
-/// Place of the state of a link, and the index of its kind in `kinds`.
+/// Place of the state of a link, and the index of its kinds in `kinds`.
 #[derive(Clone, Copy, Debug)]
 enum Memory {
-    /// A link of this kind, without state.
+    /// A link of these kinds, without state.
     Plain(u16),
-    /// A link of this kind, with its state in `remembered`.
+    /// A link of these kinds, with its state in `remembered`.
     Remembering(u16),
     /// A link of this kind, with its state in `chained`.
     Chained(u16),
@@ -158,46 +162,55 @@ impl DirectLinks {
     /// With more than 2^32 links.
     #[must_use]
     pub fn add(&mut self, seed: u64, name: &LinkName, model: &LinkModel) -> bool {
-        if let LinkModel::Modulated(modulated) = model {
-            let Some((switching, direct)) = Switching::new(seed, name, modulated, self.load) else { return false };
-            let draws = direct.draws;
-            let memory = self.other(direct, OtherLine::Switching(switching));
-            self.links.push(LinkState::new(draws, memory));
-            return true;
-        }
-        let Some(config) = model.as_fixed() else { return false };
-        // A configuration in `kinds` was checked with its first link, and needs no second check.
-        let known = self.kinds.iter().position(|(other, _)| other == config);
+        // A model in `kinds` was checked with its first link, and needs no second check.
+        let known = self.kinds.iter().position(|kinds| kinds.are_of(seed, model));
         if known.is_none() && !Self::takes(model, self.load) {
             return false;
         }
         let draws = Stream::new(seed, name.as_str().as_bytes());
-        let memory = match self.kind(known, config) {
-            // Chains come first: a kind with chains has state too, but keeps it in arrays for eight links at once.
-            Some((place, kind)) if kind.chains.is_some() => {
-                let state = kind.initial_state(draws);
-                self.chained.begin(self.links.len(), state);
-                Memory::Chained(place)
+        let memory = match self.kinds(known, seed, model) {
+            Some((place, kinds)) => {
+                let (only, remember) = (kinds.only(), kinds.remember);
+                let (has_chains, state) = only.map_or((false, Remembered::NOTHING), |kind| (kind.chains.is_some(), kind.beginning(draws)));
+                // Chains come first: a kind with chains has state too, but keeps it in arrays for eight links at once.
+                if has_chains {
+                    self.chained.begin(self.links.len(), state.state);
+                    Memory::Chained(place)
+                } else if remember {
+                    // Links added since the last link with state have no state. Their entries keep the index equal to the link's number.
+                    self.remembered.resize(self.links.len(), Remembered::NOTHING);
+                    self.remembered.push(state);
+                    Memory::Remembering(place)
+                } else {
+                    Memory::Plain(place)
+                }
             }
-            Some((place, kind)) if kind.remembers() => {
-                let beginning = kind.beginning(draws);
-                // Links added since the last link with state have no state. Their entries keep the index equal to the link's number.
-                self.remembered.resize(self.links.len(), Remembered::NOTHING);
-                self.remembered.push(beginning);
-                Memory::Remembering(place)
-            }
-            Some((place, _)) => Memory::Plain(place),
-            None => {
-                let line = Line::new(config, self.load).expect("such a link is taken");
-                self.other(Direct::new(seed, name, config), OtherLine::Constant { line, departure: Instant::ZERO, found_full: 0 })
-            }
+            None => match self.of_no_kind(seed, name, model) {
+                Some(other) => self.other(other),
+                None => return false,
+            },
         };
         self.links.push(LinkState::new(draws, memory));
         true
     }
 
+    /// Returns a link of no kind; `None` if the model needs an engine.
+    fn of_no_kind(&self, seed: u64, name: &LinkName, model: &LinkModel) -> Option<(Direct, OtherLine)> {
+        match model {
+            LinkModel::Fixed(config) => {
+                let line = Line::new(config, self.load)?;
+                Some((Direct::new(seed, name, config), OtherLine::Constant { line, departure: Instant::ZERO, found_full: 0 }))
+            }
+            LinkModel::Modulated(modulated) => {
+                let (switching, direct) = Switching::new(seed, name, modulated, self.load)?;
+                Some((direct, OtherLine::Switching(switching)))
+            }
+            LinkModel::Replay(_) | LinkModel::Kernel(_) => None,
+        }
+    }
+
     /// Adds a link of no kind, and returns its place.
-    fn other(&mut self, direct: Direct, line: OtherLine) -> Memory {
+    fn other(&mut self, (direct, line): (Direct, OtherLine)) -> Memory {
         self.others.push(Other { direct, line, outage: 0 });
         Memory::Other(u32::try_from(self.others.len() - 1).expect("fewer than 2^32 links fit into memory"))
     }
@@ -221,7 +234,13 @@ impl DirectLinks {
     /// Returns whether all links are of one kind, and this kind has correlated delays and no state but the chains of delays and of losses.
     #[must_use]
     pub fn are_chains(&self) -> bool {
-        matches!(&self.kinds[..], [(_, Kind { chains: Some(_), .. })] if self.others.is_empty())
+        matches!(&self.kinds[..], [kinds] if self.others.is_empty() && kinds.only().is_some_and(|kind| kind.chains.is_some()))
+    }
+
+    /// Returns whether all links are of one model that keeps the order of packets at all times, so that no packet overtakes another.
+    #[must_use]
+    pub fn keep_order(&self) -> bool {
+        matches!(&self.kinds[..], [kinds] if self.others.is_empty() && kinds.keep_order())
     }
 
     /// Offers packets like [`DirectLinks::offer`], for a driver with a call of [`are_chains`](DirectLinks::are_chains) before a loop: `CHAINS` is the answer.
@@ -232,33 +251,29 @@ impl DirectLinks {
     /// Like [`DirectLinks::offer`].
     #[inline(always)]
     pub fn offer_as<const CHAINS: bool>(&mut self, now: Instant, first: LinkId, count: usize, excluded: u8, arrivals: &mut Arrivals) {
-        (arrivals.arrive, arrivals.overtake) = (0, 0);
+        (arrivals.arrive, arrivals.overtake, arrivals.wait) = (0, 0, 0);
         let first = first.index();
         #[cfg(debug_assertions)]
         (0..count).filter(|place| excluded >> place & 1 == 0).for_each(|place| self.assert_load(now, first + place));
-        let (links, span) = (&mut self.links[first..first + count], (now, self.until));
         // With at most two links left, the joint draw for eight links would cost more than single offers.
         let are_few = count == Self::AT_ONCE && excluded.count_zeros() <= 2;
-        match &mut self.kinds[..] {
-            _ if are_few => self.offer_one_by_one(now, first, count, excluded, arrivals),
-            [(_, Kind { chains: Some(chains), .. })] if CHAINS && self.others.is_empty() => {
-                chains.offer((links, &mut self.chained, first), span, excluded, arrivals);
-            }
+        let kind = match &mut self.kinds[..] {
+            [kinds] if !are_few && self.others.is_empty() => kinds.at(now),
+            _ => None,
+        };
+        let Some(kind) = kind else { return self.offer_one_by_one(now, first, count, excluded, arrivals) };
+        let (links, span) = (&mut self.links[first..first + count], (now, self.until));
+        // Inlined into the driver's loop, which may be compiled for wider registers than a function of its own.
+        match &kind.chains {
+            Some(chains) if CHAINS => chains.offer((links, &mut self.chained, first), span, excluded, arrivals),
             // A wrong value of `CHAINS` is slow, but gives the same answers.
-            [(_, Kind { chains: Some(_), .. })] => self.offer_one_by_one(now, first, count, excluded, arrivals),
-            _ if CHAINS => self.offer_one_by_one(now, first, count, excluded, arrivals),
-            // `remembered` may be shorter than `links` only where several kinds exist, so with one kind the range is valid.
-            // Inlined into the driver's loop, which may be compiled for wider registers than a function of its own.
-            [(_, kind)] if self.others.is_empty() && self.remembered.is_empty() && kind.draws_jointly => {
-                alike::<false, true>(kind, (links, &mut []), span, excluded, arrivals);
-            }
-            [(_, kind)] if self.others.is_empty() && self.remembered.is_empty() => {
-                alike::<false, false>(kind, (links, &mut []), span, excluded, arrivals);
-            }
-            [(_, kind)] if self.others.is_empty() => {
-                alike::<true, false>(kind, (links, &mut self.remembered[first..first + count]), span, excluded, arrivals);
-            }
-            _ => self.offer_one_by_one(now, first, count, excluded, arrivals),
+            Some(_) => self.offer_one_by_one(now, first, count, excluded, arrivals),
+            None if CHAINS => self.offer_one_by_one(now, first, count, excluded, arrivals),
+            None if !kind.remembers && kind.draws_jointly => alike::<false, true>(kind, (links, &mut []), span, excluded, arrivals),
+            None if !kind.remembers => alike::<false, false>(kind, (links, &mut []), span, excluded, arrivals),
+            // Every link of the kind has an entry in `remembered`.
+            None if kind.draws_jointly => alike::<true, true>(kind, (links, &mut self.remembered[first..first + count]), span, excluded, arrivals),
+            None => alike::<true, false>(kind, (links, &mut self.remembered[first..first + count]), span, excluded, arrivals),
         }
     }
 
@@ -317,15 +332,16 @@ impl DirectLinks {
         let link = &mut self.links[place];
         let (words, draws) = (link.words(&self.kinds), link.draws.packet(link.offered));
         let verdict = match link.memory {
-            Memory::Plain(kind) => {
-                let kind = &mut self.kinds[usize::from(kind)].1;
-                kind.fate(now, words, draws).map(|at| link.in_order(kind.keeps_order, at))
+            Memory::Plain(kinds) => {
+                let mut nothing = Remembered::NOTHING;
+                let (verdict, keeps_order) = self.kinds[usize::from(kinds)].verdict(now, &mut nothing, words, draws);
+                verdict.map(|at| link.in_order(keeps_order, at))
             }
-            Memory::Remembering(kind) => {
-                let kind = &mut self.kinds[usize::from(kind)].1;
-                kind.verdict(now, &mut self.remembered[place], words, draws).map(|at| link.in_order(kind.keeps_order, at))
+            Memory::Remembering(kinds) => {
+                let (verdict, keeps_order) = self.kinds[usize::from(kinds)].verdict(now, &mut self.remembered[place], words, draws);
+                verdict.map(|at| link.in_order(keeps_order, at))
             }
-            Memory::Chained(kind) => match &self.kinds[usize::from(kind)].1.chains {
+            Memory::Chained(kinds) => match self.kinds[usize::from(kinds)].only().and_then(|kind| kind.chains.as_ref()) {
                 Some(chains) => chains.verdict(now, &mut self.chained, place, words, draws),
                 None => unreachable!("links of its kind have chains"),
             },
@@ -370,19 +386,19 @@ impl DirectLinks {
         LinkStats::counted(offered, delivered, delay_nanos, dropped)
     }
 
-    /// Returns the index of the link's kind and the kind. `known` is the index if the configuration has a kind already; else the kind is added. Returns `None`
-    /// if a kind has too little state for the configuration, or if there are too many kinds.
-    fn kind(&mut self, known: Option<usize>, config: &LinkConfig) -> Option<(u16, &Kind)> {
+    /// Returns the index of the kinds of a model and the kinds. `known` is the index if the model has kinds already; else the kinds are added. Returns
+    /// `None` if kinds have too little state for the model, or if there are too many kinds.
+    fn kinds(&mut self, known: Option<usize>, seed: u64, model: &LinkModel) -> Option<(u16, &Kinds)> {
         let place = match known {
             Some(place) => place,
             // The list is searched from its beginning for each added link, so its length is limited.
             None if self.kinds.len() >= 64 => return None,
             None => {
-                self.kinds.push((config.clone(), Kind::new(config, self.load)?));
+                self.kinds.push(Kinds::new(seed, model, self.load)?);
                 self.kinds.len() - 1
             }
         };
-        Some((u16::try_from(place).ok()?, &self.kinds[place].1))
+        Some((u16::try_from(place).ok()?, &self.kinds[place]))
     }
 }
 
@@ -447,24 +463,30 @@ fn alike<const REMEMBER: bool, const JOINTLY: bool>(
     arrivals: &mut Arrivals,
 ) {
     let words = draw(kind.is_random, links, &mut arrivals.sequences);
-    let delays = if JOINTLY { kind.delays(&words) } else { [Law::UNKNOWN; DirectLinks::AT_ONCE] };
-    let (mut bit, mut arrive, mut overtake) = (1, 0, 0);
+    let (values, delays) = match JOINTLY {
+        true if REMEMBER => kind.delays_of_chains(now, remembered, &words),
+        true => ([0.0; DirectLinks::AT_ONCE], kind.delays(&words)),
+        false => ([0.0; DirectLinks::AT_ONCE], [Law::UNKNOWN; DirectLinks::AT_ONCE]),
+    };
+    let (mut bit, mut arrive, mut overtake, mut wait) = (1, 0, 0, 0);
     for place in 0..links.len().min(DirectLinks::AT_ONCE) {
         let (link, words) = (&mut links[place], words[place]);
         // An excluded link counts no packet, so its next packet has the same number and random words.
         if excluded & bit == 0 {
             let draws = link.draws.packet(link.offered);
             let verdict = match delays[place] {
+                nanos if REMEMBER && JOINTLY => kind.verdict_of_known(now, &mut remembered[place], words, draws, (values[place], nanos)),
                 _ if REMEMBER => kind.verdict(now, &mut remembered[place], words, draws),
                 nanos if JOINTLY && nanos != Law::UNKNOWN => kind.fate_of_known(now, words[0], nanos),
                 _ => kind.fate(now, words, draws),
             };
             link.offered += 1;
             match verdict {
-                Verdict::Arrives(arrival) => {
-                    let arrival = link.in_order(kind.keeps_order, arrival);
+                Verdict::Arrives(wanted) => {
+                    let arrival = link.in_order(kind.keeps_order, wanted);
                     arrivals.at[place] = arrival;
                     arrive |= bit;
+                    wait |= if arrival > wanted { bit } else { 0 };
                     overtake |= if link.count_arrival(now, until, arrival) { bit } else { 0 };
                 }
                 Verdict::Lost => link.lost += 1,
@@ -473,12 +495,12 @@ fn alike<const REMEMBER: bool, const JOINTLY: bool>(
         }
         bit = bit.wrapping_shl(1);
     }
-    (arrivals.arrive, arrivals.overtake) = (arrive, overtake);
+    (arrivals.arrive, arrivals.overtake, arrivals.wait) = (arrive, overtake, wait);
 }
 
 impl Arrivals {
     /// No packet arrives.
-    pub const NONE: Self = Self { arrive: 0, overtake: 0, sequences: [0; DirectLinks::AT_ONCE], at: [Instant::ZERO; DirectLinks::AT_ONCE] };
+    pub const NONE: Self = Self { arrive: 0, overtake: 0, wait: 0, sequences: [0; DirectLinks::AT_ONCE], at: [Instant::ZERO; DirectLinks::AT_ONCE] };
 
     /// Returns the array indices of the arriving packets, in ascending order.
     #[inline(always)]
@@ -496,6 +518,12 @@ impl Arrivals {
     #[must_use]
     pub const fn overtakes(&self, place: usize) -> bool {
         self.overtake >> place & 1 == 1
+    }
+
+    /// Returns whether the packet at this array index is known to wait, and so to arrive together with an earlier packet.
+    #[must_use]
+    pub const fn waits(&self, place: usize) -> bool {
+        self.wait >> place & 1 == 1
     }
 }
 
@@ -540,9 +568,9 @@ impl LinkState {
 
     /// Returns the first random words of the next packet, or zeros if the link's kind is not random.
     #[inline(always)]
-    fn words(&self, kinds: &[(LinkConfig, Kind)]) -> Words {
+    fn words(&self, kinds: &[Kinds]) -> Words {
         match self.memory {
-            Memory::Plain(kind) | Memory::Remembering(kind) if !kinds[usize::from(kind)].1.is_random => [0; 2],
+            Memory::Plain(place) | Memory::Remembering(place) if !kinds[usize::from(place)].are_random => [0; 2],
             Memory::Plain(_) | Memory::Remembering(_) | Memory::Chained(_) | Memory::Other(_) => self.draws.packet(self.offered).loss_and_jitter(),
         }
     }

@@ -1,4 +1,4 @@
-//! Links with a modulator under a load so easy that no packet waits in any state.
+//! Links with a modulator under a load so easy that no packet waits in any state: the modulator, and links with more state than a [kind](super::kind) has.
 //!
 //! The changes of state are a function of the seed and the name of the modulator, so that the departure of a packet is certain at its offer, also where the
 //! rate changes while the packet is in transmission.
@@ -27,9 +27,9 @@ pub(super) struct Switching {
     states: Box<States>,
 }
 
-/// States of the modulator of one link.
+/// States of a modulator, and the transmitter of a link in each state.
 #[derive(Clone, Debug)]
-struct States {
+pub(super) struct States {
     stage: ModulationStage,
     /// Indexed by state.
     transmitters: Arc<[Transmitter]>,
@@ -58,14 +58,11 @@ impl Switching {
 
     /// Returns the modulator of a link, and the direct stages of the link at the begin of time. Returns `None` if [`takes`](Self::takes) refuses the link.
     pub(super) fn new(seed: u64, name: &LinkName, modulated: &Modulated, load: Load) -> Option<(Self, Direct)> {
-        let transmitters = Transmitter::of_states(modulated, load)?;
-        let stage = ModulationStage::new(seed, modulated.clone(), Instant::ZERO);
+        let states = Box::new(States::new(seed, modulated, load)?);
         // As in the general pipeline, where a change of the configuration at the begin of time brings the first state.
         let mut direct = Direct::new(seed, name, &LinkConfig::default());
-        direct.reconfigure(Instant::ZERO, stage.config());
-        let next = stage.next_change().unwrap_or(Instant::MAX);
-        let states = Box::new(States { stage, transmitters });
-        Some((Self { next, departure: Instant::ZERO, time: states.transmitter().time, states }, direct))
+        direct.reconfigure(Instant::ZERO, states.stage.config());
+        Some((Self { next: states.next_change(), departure: Instant::ZERO, time: states.transmitter().time, states }, direct))
     }
 
     /// Lets all changes up to `now` happen.
@@ -87,33 +84,61 @@ impl Switching {
     }
 
     #[cold]
-    fn departure_over_changes(&mut self, mut since: Instant, direct: &mut Direct) -> Instant {
-        let mut left = self.states.transmitter().bits;
-        loop {
-            // Either every state has a rate or none, and without a rate a packet takes no time and meets no change.
-            let Some(rate) = self.states.transmitter().rate else { return since };
-            let leaves = since.saturating_add(rate.transmission_time(left));
-            if leaves <= self.next {
-                return leaves;
-            }
-            // The bits sent at the old rate stay sent.
-            left = left.saturating_sub(rate.bits_sent(self.next.saturating_duration_since(since)));
-            since = self.next;
-            self.change(direct);
-        }
+    fn departure_over_changes(&mut self, since: Instant, direct: &mut Direct) -> Instant {
+        let leaves = self.states.departure_over_changes(since, |at, config| direct.reconfigure(at, config));
+        (self.next, self.time) = (self.states.next_change(), self.states.transmitter().time);
+        leaves
     }
 
     #[cold]
     fn change(&mut self, direct: &mut Direct) {
-        let stage = &mut self.states.stage;
-        stage.change();
-        direct.reconfigure(self.next, stage.config());
-        self.next = stage.next_change().unwrap_or(Instant::MAX);
-        self.time = self.states.transmitter().time;
+        self.states.change();
+        direct.reconfigure(self.next, self.states.stage.config());
+        (self.next, self.time) = (self.states.next_change(), self.states.transmitter().time);
     }
 }
 
 impl States {
+    /// Returns the modulator at the begin of time. Returns `None` if [`Switching::takes`] refuses the link.
+    pub(super) fn new(seed: u64, modulated: &Modulated, load: Load) -> Option<Self> {
+        let transmitters = Transmitter::of_states(modulated, load)?;
+        Some(Self { stage: ModulationStage::new(seed, modulated.clone(), Instant::ZERO), transmitters })
+    }
+
+    /// Returns the index of the present state.
+    pub(super) const fn present(&self) -> usize {
+        self.stage.state()
+    }
+
+    /// Returns the instant of the next change, or the end of time.
+    pub(super) fn next_change(&self) -> Instant {
+        self.stage.next_change().unwrap_or(Instant::MAX)
+    }
+
+    /// Moves to the next state.
+    pub(super) fn change(&mut self) {
+        self.stage.change();
+    }
+
+    /// Returns the departure of a packet whose transmission begins at `since`, and lets the changes before the departure happen. `changed` is called with
+    /// the instant and the configuration of each change.
+    pub(super) fn departure_over_changes(&mut self, mut since: Instant, mut changed: impl FnMut(Instant, &LinkConfig)) -> Instant {
+        let mut left = self.transmitter().bits;
+        loop {
+            // Either every state has a rate or none, and without a rate a packet takes no time and meets no change.
+            let Some(rate) = self.transmitter().rate else { return since };
+            let (leaves, next) = (since.saturating_add(rate.transmission_time(left)), self.next_change());
+            if leaves <= next {
+                return leaves;
+            }
+            // The bits sent at the old rate stay sent.
+            left = left.saturating_sub(rate.bits_sent(next.saturating_duration_since(since)));
+            since = next;
+            self.change();
+            changed(since, self.stage.config());
+        }
+    }
+
     fn transmitter(&self) -> &Transmitter {
         &self.transmitters[self.stage.state()]
     }

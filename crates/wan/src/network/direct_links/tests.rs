@@ -8,8 +8,9 @@ use crate::laws::sojourn::Sojourn;
 use crate::link::Link;
 use crate::netem::Netem;
 use crate::packet::PacketInfo;
-use crate::stages::config::Layout;
+use crate::stages::config::{Layout, LinkConfig};
 use crate::stages::delay::{Correlation, Delay, Jitter};
+use crate::stages::loss::{GilbertElliottInTime, Loss};
 use crate::stages::modulation::{Modulated, Modulator, ModulatorState};
 use crate::stages::order::Order;
 use crate::stages::queue::{Bottleneck, CoDel, Discipline, Framing, QueueLimit, Red, TokenBucket, nanos};
@@ -130,8 +131,8 @@ fn lines_without_wait_decide_what_whole_links_decide() {
     }
 }
 
-/// Delays of lognormal and gamma laws without correlation are drawn for several links together: with loss and without, in order, and behind a line on which no packet
-/// waits. The last law is nearly always at its floor, and has series of logarithms.
+/// Delays of lognormal and gamma laws without correlation are drawn for several links together: with loss and without, in order, and behind a line on which
+/// no packet waits. The last law is nearly always at its floor, and has series of logarithms.
 #[test]
 fn delays_that_are_drawn_together_are_those_of_whole_links() {
     let us = Duration::from_micros;
@@ -221,6 +222,18 @@ fn links_with_a_modulator_decide_what_whole_links_decide() {
         config("delay 24ms 4ms 50% loss gemodel 5% 20% 30% 2%", None, keeps),
         config("delay 20ms 5ms distribution normal loss state 5% 20%", None, jumps),
     ];
+    // Chains of losses in time that begin anew after a state without one, and that go on from one state with a chain to the next.
+    let bursts = |good: u64, bad: u64, rate: u64, order: Order| {
+        let (millis, half) = (Duration::from_millis, Probability::new(0.5).unwrap());
+        let chain = GilbertElliottInTime::new(millis(good), millis(bad), Probability::ZERO, if good > 30 { Probability::ONE } else { half });
+        LinkConfig { loss: Loss::GilbertElliottInTime(chain.unwrap()), ..config("delay 24ms 9ms distribution normal", Some(rate), order) }
+    };
+    let bursts = vec![
+        bursts(40, 20, 100_000, keeps),
+        bursts(20, 60, 250_000, keeps),
+        config("delay 9ms loss 10%", Some(800_000), keeps),
+        config("delay 20ms 5ms distribution normal", Some(100_000), jumps),
+    ];
     let stops = vec![config("delay 24ms 9ms", Some(100_000), jumps), config("delay 5ms loss 50%", None, jumps)];
     let links = [
         // A state lasts for 17 ms, so that every third change falls into a transmission.
@@ -228,7 +241,10 @@ fn links_with_a_modulator_decide_what_whole_links_decide() {
         modulated("walk", Sojourn::Fixed(Duration::from_millis(17)), walk(keeps)),
         modulated("fast", Sojourn::Exponential(Duration::from_millis(7)), walk(keeps)),
         modulated("laws", Sojourn::Exponential(Duration::from_millis(40)), laws),
+        modulated("bursts", Sojourn::Exponential(Duration::from_millis(60)), bursts),
     ];
+    let kinds = links.iter().map(|link| Kinds::new(7, link, load).is_some()).collect::<Vec<_>>();
+    assert_eq!(kinds, [true, true, true, false, true], "a chain of delays begins anew with each turn, so that only such links are of no kind");
     compare_under(load, &links);
     for link in links {
         compare_under(load, &[const { None }; 8].map(|_: Option<()>| link.clone()));
@@ -277,6 +293,8 @@ fn compare_in_groups(load: Load, direct: &[LinkModel], together: usize) {
             for place in offered.places() {
                 let so_far = &mut arrivals[first + place];
                 assert_eq!(offered.overtakes(place), so_far.iter().any(|(at, _)| *at > offered.at[place]));
+                let latest = so_far.iter().map(|(at, _)| *at).max();
+                assert!(!offered.waits(place) || latest == Some(offered.at[place]));
                 so_far.push((offered.at[place], offered.sequences[place]));
             }
         }

@@ -165,6 +165,8 @@ impl DelayStage {
 #[derive(Clone, Debug)]
 pub(crate) struct CorrelatedDelays {
     marginal: Marginal,
+    /// Law of a delay, if delays are computed from a normal number: lognormal and gamma.
+    law: Option<Arc<Checked>>,
     memory: Memory,
     /// `true` if only a share of the variance has memory.
     is_of_share: bool,
@@ -188,8 +190,33 @@ impl CorrelatedDelays {
         }
         // A gamma law gets a separate form, without the choice between laws at each packet.
         let marginal = checked.law.as_gamma().map_or_else(|| Marginal::Other(Arc::clone(checked)), Marginal::Gamma);
+        let is_from_normal = matches!(checked.jitter.distribution, Distribution::LogNormal | Distribution::Gamma);
+        let law = is_from_normal.then(|| Arc::clone(checked));
         let is_of_share = matches!(memory, Memory::InTime { parts: [_, rest], .. } if rest > 0.0);
-        Some(Self { marginal, memory, is_of_share, weights: Weights::new(memory, 0) })
+        Some(Self { marginal, law, memory, is_of_share, weights: Weights::new(memory, 0) })
+    }
+
+    /// Returns whether a delay is a function of the value of its chain that is computed for several links at once: see
+    /// [`nanos_at_once`](Self::nanos_at_once).
+    pub(crate) fn is_from_normal(&self) -> bool {
+        self.law.is_some() && !self.is_of_share
+    }
+
+    /// Returns the next values of the chains of several links whose packets begin to propagate `now`, and the delays \[ns\]. `chains` has the latest value
+    /// of each chain and the instant of the value. A delay is [`Law::UNKNOWN`] where [`draw_nanos`](Self::draw_nanos) must draw it, and the value has no
+    /// meaning then.
+    #[inline(always)]
+    pub(crate) fn nanos_at_once<const N: usize>(&self, now: Instant, chains: &[(f64, Instant); N], words: &[u64; N]) -> ([f64; N], [u64; N]) {
+        let Some(checked) = &self.law else { return ([0.0; N], [Law::UNKNOWN; N]) };
+        let (mut before, is_in_time) = ([0.0; N], self.is_in_time());
+        for (before, (value, at)) in before.iter_mut().zip(chains) {
+            // Links that are offered packets together have the weights of one span. The rare others are drawn singly.
+            let has_weights = !is_in_time || now.as_nanos().saturating_sub(at.as_nanos()) == self.weights.span;
+            *before = if has_weights { *value } else { f64::NAN };
+        }
+        let following = self.following(&before, words);
+        let nanos = checked.law.whole_at_normals(&following);
+        (following, nanos)
     }
 
     /// Returns whether the correlation depends on the time between packets.
@@ -197,8 +224,8 @@ impl CorrelatedDelays {
         matches!(self.memory, Memory::InTime { .. })
     }
 
-    /// Returns the delay \[ns\] of a packet that begins to propagate `now`. `chain` is the latest value of its link's chain and the instant of the value, or NaN
-    /// before the first packet; the call replaces both.
+    /// Returns the delay \[ns\] of a packet that begins to propagate `now`. `chain` is the latest value of its link's chain and the instant of the value, or
+    /// NaN before the first packet; the call replaces both.
     #[inline(always)]
     pub(crate) fn draw_nanos(&mut self, now: Instant, (chain, at): (&mut f64, &mut Instant), word: u64, packet: PacketDraws) -> u64 {
         if self.is_in_time() {
@@ -313,7 +340,8 @@ fn normal(purpose: Purpose, word: u64, packet: PacketDraws) -> f64 {
     })
 }
 
-/// Returns a delay of a law that is drawn from a normal number. Not inlined, so that the draw of the normal law, the most frequent law, stays small enough for inlining.
+/// Returns a delay of a law that is drawn from a normal number. Not inlined, so that the draw of the normal law, the most frequent law, stays small enough
+/// for inlining.
 #[inline(never)]
 fn from_normal(law: &Law, purpose: Purpose, word: u64, packet: PacketDraws) -> u64 {
     at_normal(law, normal(purpose, word, packet))

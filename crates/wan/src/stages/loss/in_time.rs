@@ -72,26 +72,42 @@ impl GilbertElliottInTime {
         (1.0 - self.k.get()) * (1.0 - bad) + (1.0 - self.h.get()) * bad
     }
 
-    /// Moves the chain to a packet's instant, and returns whether the packet is lost. `seen` is `None` before the first packet. `transition` and `loss` are
-    /// random words.
-    pub(crate) fn loses(&self, seen: &mut Option<Seen>, now: Instant, transition: u64, loss: u64) -> bool {
-        let stationary = self.bad_fraction();
-        let bad = match *seen {
-            // Before the first packet the state has the stationary law.
-            None => stationary,
-            Some(before) => {
-                let gap = now.saturating_duration_since(before.at).as_secs_f64();
-                let rate = 1.0 / self.good.as_secs_f64() + 1.0 / self.bad.as_secs_f64();
-                // `expm1` keeps the precision of 1 − e^(−x) for gaps much shorter than the times in the states.
-                let memory = libm::exp(-rate * gap);
-                if before.bad { stationary + (1.0 - stationary) * memory } else { stationary * -libm::expm1(-rate * gap) }
-            }
+    /// Returns the probability of the bad state at the first packet: the stationary law.
+    pub(crate) fn bad_at_first(&self) -> Probability {
+        Probability::new(self.bad_fraction()).unwrap_or_default()
+    }
+
+    /// Returns the probability of the bad state at a packet that comes `gap` after the packet before, at which the chain was in the bad state if `was_bad`
+    /// is set.
+    pub(crate) fn bad_after(&self, gap: Duration, was_bad: bool) -> Probability {
+        let (stationary, gap) = (self.bad_fraction(), gap.as_secs_f64());
+        let rate = 1.0 / self.good.as_secs_f64() + 1.0 / self.bad.as_secs_f64();
+        let bad = if was_bad {
+            stationary + (1.0 - stationary) * libm::exp(-rate * gap)
+        } else {
+            // `expm1` keeps the precision of 1 − e^(−x) for gaps much shorter than the times in the states.
+            stationary * -libm::expm1(-rate * gap)
         };
         // Rounding can lead a little outside of 0 to 1, and `Probability` refuses such numbers.
-        let bad = Probability::new(bad.clamp(0.0, 1.0)).unwrap_or_default().happens(transition);
-        *seen = Some(Seen { bad, at: now });
+        Probability::new(bad.clamp(0.0, 1.0)).unwrap_or_default()
+    }
+
+    /// Returns whether a packet is lost that meets the state. The word for the loss is drawn only for a loss that is uncertain within the state.
+    pub(crate) fn loses_in(&self, bad: bool, loss: impl FnOnce() -> u64) -> bool {
         let gets_through = if bad { self.h } else { self.k };
-        !gets_through.happens(loss)
+        gets_through == Probability::ZERO || gets_through != Probability::ONE && !gets_through.happens(loss())
+    }
+
+    /// Moves the chain to a packet's instant, and returns whether the packet is lost. `seen` is `None` before the first packet. `transition` and `loss` are
+    /// random words.
+    pub(crate) fn loses(&self, seen: &mut Option<Seen>, now: Instant, transition: u64, loss: impl FnOnce() -> u64) -> bool {
+        let bad = match *seen {
+            None => self.bad_at_first(),
+            Some(before) => self.bad_after(now.saturating_duration_since(before.at), before.bad),
+        };
+        let bad = bad.happens(transition);
+        *seen = Some(Seen { bad, at: now });
+        self.loses_in(bad, loss)
     }
 }
 
@@ -115,7 +131,8 @@ mod tests {
             let lost: Vec<bool> = (0..count)
                 .map(|number| {
                     let mut draws = stream.packet(number).draws(Purpose::Loss);
-                    chain.loses(&mut seen, Instant::from_nanos(number * spacing * 1_000_000), draws.next_word(), draws.next_word())
+                    let transition = draws.next_word();
+                    chain.loses(&mut seen, Instant::from_nanos(number * spacing * 1_000_000), transition, || draws.next_word())
                 })
                 .collect();
             let total = lost.iter().filter(|lost| **lost).count() as f64;

@@ -162,7 +162,7 @@ impl Remembering {
             // The second word is drawn only for a loss that is uncertain within a state.
             Self::GilbertElliott(chain, state) => chain.loses(state, word, || packet.more(Purpose::Loss).next_word()),
             // The first word moves the chain, and the second word decides about the loss in the new state.
-            Self::InTime(chain, seen) => chain.loses(seen, now, word, packet.more(Purpose::Loss).next_word()),
+            Self::InTime(chain, seen) => chain.loses(seen, now, word, || packet.more(Purpose::Loss).next_word()),
             Self::FourState(chain, state) => chain.loses(state, unit(word)),
             Self::Pattern(pattern) => pattern.covers(number, now),
         }
