@@ -48,6 +48,9 @@ pub(super) struct Packet<const A: usize> {
     /// Place of the sample at the receiver, times the number of runs, plus the run.
     pub(super) place: u32,
     pub(super) receiver: u16,
+    /// Number of packets directly before this one on its link that arrive together with it, so that no receiver ever sees them. The packet stands for them: see
+    /// [`InFlight::push_in_order`].
+    pub(super) stands_for: u16,
     pub(super) position: [f64; A],
     pub(super) velocity: [f64; A],
 }
@@ -92,6 +95,29 @@ impl<const A: usize> InFlight<A> {
         let ticks = self.ticks.count(packet.arrival.as_nanos() - now.as_nanos());
         let due = tick.saturating_add(ticks);
         self.packets_at((ticks, due), overtakes).push(packet);
+    }
+
+    /// Stores a packet like [`push`](Self::push), of a link that keeps the order of packets. `latest` is the index of the latest packet of the link among
+    /// the packets of its tick, and is replaced. `waits`: `true` if the packet arrives together with that packet.
+    ///
+    /// Of packets that arrive together a receiver sees the newest only, so the newest takes the place of the others. Behind a packet with a long delay many
+    /// packets wait, more than a cache holds.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 packets of a tick fit into memory")]
+    pub(super) fn push_in_order(&mut self, (tick, now): (u64, Instant), packet: Packet<A>, waits: bool, latest: &mut u32) {
+        let ticks = self.ticks.count(packet.arrival.as_nanos() - now.as_nanos());
+        let packets = self.packets_at((ticks, tick.saturating_add(ticks)), false);
+        // Sequence numbers without a gap tell which packets this packet stands for. The latest packet is elsewhere if it was pushed beyond the wheel.
+        if waits
+            && let Some(before) = packets.get_mut(*latest as usize)
+            && (before.place, before.arrival, before.sequence + 1) == (packet.place, packet.arrival, packet.sequence)
+            && before.stands_for < u16::MAX
+        {
+            *before = Packet { stands_for: before.stands_for + 1, ..packet };
+            return;
+        }
+        *latest = packets.len() as u32;
+        packets.push(packet);
     }
 
     /// Returns the packets due at the tick `due`, `ticks` ticks ahead.
@@ -173,8 +199,15 @@ mod tests {
     #[test]
     fn late_samples_take_the_memory_of_earlier_ones() {
         let mut in_flight = InFlight::<1>::new(1);
-        let packet =
-            |arrival: u64| Packet { arrival: Instant::from_nanos(arrival), sequence: 0, place: 0, receiver: 0, position: [0.0], velocity: [0.0] };
+        let packet = |arrival: u64| Packet {
+            arrival: Instant::from_nanos(arrival),
+            sequence: 0,
+            place: 0,
+            receiver: 0,
+            stands_for: 0,
+            position: [0.0],
+            velocity: [0.0],
+        };
         let mut most = 0;
         for tick in 0..10_000 {
             let now = (tick, Instant::from_nanos(tick));
@@ -192,6 +225,36 @@ mod tests {
         // Two for each tick ahead up to the latest arrival.
         assert!(most <= 2 * 1901, "{most} lists");
         assert_eq!(in_flight.iter().count(), 2 * 1700 + 1900 + 7);
+    }
+
+    /// Packets of two links that wait in turn, beyond the wheel and within: of packets that arrive together the newest remains, and stands for those
+    /// directly before it.
+    #[test]
+    fn a_packet_stands_for_those_that_arrive_with_it() {
+        let mut in_flight = InFlight::<1>::new(1);
+        let mut latest = [0; 2];
+        let mut push = |now: u64, place: u32, sequence: u64, arrival: u64, waits: bool| {
+            let packet =
+                Packet { arrival: Instant::from_nanos(arrival), sequence, place, receiver: 0, stands_for: 0, position: [0.0], velocity: [0.0] };
+            in_flight.push_in_order((now, Instant::from_nanos(now)), packet, waits, &mut latest[place as usize]);
+        };
+        for (sequence, now) in (0..).zip([0, 10, 2000, 2001, 2002]) {
+            push(now, 0, sequence, 2500, sequence > 0);
+        }
+        push(2000, 1, 7, 2500, false);
+        push(2001, 1, 8, 2500, true);
+        // A lost packet is not stood for.
+        push(2002, 1, 10, 2500, true);
+        push(2003, 1, 11, 2500, true);
+        push(2003, 0, 5, 2501, false);
+        let mut found = |tick: u64| {
+            let bucket = in_flight.due(tick).unwrap();
+            let mut found: Vec<_> = bucket.in_order.iter().map(|packet| (packet.place, packet.sequence, packet.stands_for)).collect();
+            found.sort_unstable();
+            found
+        };
+        assert_eq!(found(2500), [(0, 1, 1), (0, 4, 2), (1, 8, 1), (1, 11, 1)]);
+        assert_eq!(found(2501), [(0, 5, 0)]);
     }
 
     /// At every edge: of a tick, of the range in which the reciprocal is exact, of the range of ticks that have one.

@@ -3,6 +3,7 @@
 //! Peers read arrived samples only at ticks, and all peers tick together. Samples in flight therefore lie in a timing wheel indexed by the tick of their
 //! arrival. Nothing is sorted but samples with an arrival at the same tick over a link with overtaking samples.
 
+mod direct;
 mod neighbours;
 
 use std::ops::Range;
@@ -10,8 +11,9 @@ use std::ops::Range;
 use cohaptic_peer::{EXACT_FROM, ExactMeans, Moving, State};
 use cohaptic_scene::Scene;
 use cohaptic_units::{Ecn, Instant};
-use cohaptic_wan::{Arrivals, DirectLinks, LinkId, LinkModel, LinkName, LinkStats, PacketInfo, SteppedLinks};
-use pulp::NullaryFnOnce;
+use cohaptic_wan::{DirectLinks, LinkId, LinkModel, LinkName, LinkStats, PacketInfo, SteppedLinks};
+
+use direct::{ByChain, ByLink, BySender, DirectSending, InOrder};
 
 use super::in_flight::{Bucket, InFlight, Packet};
 use super::quads::{self, Quad};
@@ -42,6 +44,8 @@ pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
     /// `true` if a peer sends at the present tick, indexed by peer of the scene.
     sends: Vec<bool>,
     in_flight: InFlight<A>,
+    /// Index of the latest packet of a link that keeps the order, indexed by link: see [`InFlight::push_in_order`]. Links are counted as in `links`.
+    latest: Vec<u32>,
     /// Samples held, indexed by axis, then ordered by receiver and sender. Each receiver has whole quads, and the last quad may be padded.
     held: [Vec<Quad<L>>; A],
     /// Sums of the held samples, indexed by receiver; `None` if the mean of the receiver is not exact. Empty if no mean is exact. Exact means are computed in
@@ -93,11 +97,14 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
         let count = receivers.len();
         let places = rows.places(count);
+        // Only links from all peers are computed together in one loop.
+        let indexed = if let Rows::All { peers, .. } = rows { count * peers * L } else { 0 };
         let mut samples = Self {
             end: shape.end,
             links,
             sends: vec![false; peers],
             in_flight: InFlight::new(nanos(shape.tick)),
+            latest: vec![0; if shape.way == Way::Direct { indexed } else { 0 }],
             held: std::array::from_fn(|_| quads::empty(places)),
             sums: Vec::new(),
             next: vec![0; places * L],
@@ -141,7 +148,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         let Rows::All { peers, .. } = self.rows else {
             return self.send_to_neighbours((tick, now), senders, sent, next);
         };
-        let Self { rows, receivers, links, sends, in_flight, .. } = self;
+        let Self { rows, receivers, links, sends, in_flight, latest, .. } = self;
         match links {
             Links::Direct(links) => {
                 // `sends` has the senders as flags, for the link-by-link ways.
@@ -149,11 +156,12 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
                 senders.iter().for_each(|sender| sends[*sender] = true);
                 let (receivers, sends) = (receivers.clone(), &**sends);
                 // Links are computed eight at a time. This does not pay if few of eight carry a packet.
-                let (are_few, are_chains) = (L == 1 && senders.len() * 4 < peers, links.are_chains());
-                let sending = DirectSending { peers, receivers, links, senders, sends, sent, in_flight, at: (tick, now) };
+                let (are_few, are_chains, keep_order) = (L == 1 && senders.len() * 4 < peers, links.are_chains(), links.keep_order());
+                let sending = DirectSending { peers, receivers, links, senders, sends, sent, in_flight, latest, at: (tick, now) };
                 match are_chains {
                     _ if are_few => on_widest(processor, BySender(sending)),
                     true => on_widest(processor, ByChain(sending)),
+                    false if keep_order => on_widest(processor, InOrder(sending)),
                     false => on_widest(processor, ByLink(sending)),
                 }
             }
@@ -427,7 +435,8 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
 
     #[cold]
     fn count_stale(&mut self, packet: &Packet<A>) {
-        self.stale[usize::from(packet.receiver) * L + packet.place as usize % L] += 1;
+        // Sequence numbers of the packets that this one stands for have no gap, so all of these packets are stale too.
+        self.stale[usize::from(packet.receiver) * L + packet.place as usize % L] += 1 + u64::from(packet.stands_for);
     }
 
     /// Ends a run at the instant `at` before the end of the scene: samples still in flight never arrive, and links do nothing more.
@@ -442,11 +451,13 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         for packet in self.in_flight.iter().filter(|packet| packet.place as usize % L == run) {
             let receiver = usize::from(packet.receiver);
             let column = self.rows.column_of(receiver, packet.place as usize / L);
-            let sent = sent(self.rows.sender(receiver, column), packet.sequence);
-            let link = LinkId::new(self.rows.link(receiver, column) * L + run);
-            match &mut self.links {
-                Links::Direct(links) => links.forget(link, sent, packet.arrival),
-                Links::Stepped(links) => links.forget(link, sent, packet.arrival),
+            let (sender, link) = (self.rows.sender(receiver, column), LinkId::new(self.rows.link(receiver, column) * L + run));
+            for sequence in packet.sequence - u64::from(packet.stands_for)..=packet.sequence {
+                let sent = sent(sender, sequence);
+                match &mut self.links {
+                    Links::Direct(links) => links.forget(link, sent, packet.arrival),
+                    Links::Stepped(links) => links.forget(link, sent, packet.arrival),
+                }
             }
         }
     }
@@ -463,136 +474,5 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
             Links::Direct(links) => links.stats(link),
             Links::Stepped(links) => links.stats(link),
         })
-    }
-}
-
-/// Packets of a tick over direct links, if all peers hear all other peers.
-///
-/// Compiled for any processor and for processors with AVX2.
-struct DirectSending<'a, const A: usize, const L: usize> {
-    /// Number of peers of the scene.
-    peers: usize,
-    receivers: Range<usize>,
-    links: &'a mut DirectLinks,
-    senders: &'a [usize],
-    /// `true` if a peer of the scene is among `senders`, indexed by peer.
-    sends: &'a [bool],
-    sent: &'a [Sample<A, L>],
-    in_flight: &'a mut InFlight<A>,
-    /// Present tick and its instant.
-    at: (u64, Instant),
-}
-
-/// One type, and so one compiled function, for each way of sending: several ways in one function need more registers than the processor has.
-struct BySender<'a, const A: usize, const L: usize>(DirectSending<'a, A, L>);
-struct ByChain<'a, const A: usize, const L: usize>(DirectSending<'a, A, L>);
-struct ByLink<'a, const A: usize, const L: usize>(DirectSending<'a, A, L>);
-
-impl<const A: usize, const L: usize> NullaryFnOnce for BySender<'_, A, L> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        self.0.by_sender();
-    }
-}
-
-impl<const A: usize, const L: usize> NullaryFnOnce for ByChain<'_, A, L> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        self.0.by_link::<true>();
-    }
-}
-
-impl<const A: usize, const L: usize> NullaryFnOnce for ByLink<'_, A, L> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        self.0.by_link::<false>();
-    }
-}
-
-impl<const A: usize, const L: usize> DirectSending<'_, A, L> {
-    /// Sends link by link, eight at a time and without a gap between the rows of receivers, so only the last eight can be incomplete. `CHAINS`: `true`
-    /// if a delay of the links depends on earlier delays.
-    #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "the bits of eight links")]
-    fn by_link<const CHAINS: bool>(self) {
-        let Self { peers, receivers, links, senders, sends, sent, in_flight, at } = self;
-        let (row, all_send) = (peers * L, senders.len() == peers);
-        let count = receivers.len() * row;
-        // Next link from a receiver to itself; receiver of the present link; end of the row of this receiver.
-        let (mut own, mut receiver, mut end) = (receivers.start * L, 0, row);
-        let mut arrivals = Arrivals::NONE;
-        for first in (0..count).step_by(DirectLinks::AT_ONCE) {
-            let mut but = 0_u8;
-            // Links from a receiver to itself are excluded by their bits in `but`, one for each run.
-            while own < first + DirectLinks::AT_ONCE {
-                but |= (((1_u16 << L) - 1) << (own - first)) as u8;
-                own += row + L;
-            }
-            while first >= end {
-                (receiver, end) = (receiver + 1, end + row);
-            }
-            // A sender that does not send at this tick has its bits set too, one for each run of its links.
-            let together = DirectLinks::AT_ONCE.min(count - first);
-            if !all_send {
-                for place in (0..together).filter(|place| !sends[(first + place + row - end) % row / L]) {
-                    but |= 1 << place;
-                }
-            }
-            links.offer_as::<CHAINS>(at.1, LinkId::new(first), together, but, &mut arrivals);
-            for place in arrivals.places() {
-                while first + place >= end {
-                    (receiver, end) = (receiver + 1, end + row);
-                }
-                let to = (receiver, receivers.start + receiver);
-                let packet = packet(peers, to, first + place + row - end, sent, arrivals.at[place], arrivals.sequences[place]);
-                in_flight.push(at, packet, arrivals.overtakes(place));
-            }
-        }
-    }
-
-    /// Sends sender by sender, one link at a time, in a single run.
-    #[inline(always)]
-    fn by_sender(self) {
-        let Self { peers, receivers, links, senders, sent, in_flight, at, .. } = self;
-        for sender in senders {
-            for to in receivers.clone().enumerate().filter(|(_, peer)| peer != sender) {
-                let link = LinkId::new(to.0 * peers + sender);
-                // The sequence number is the number of packets offered before, so it is read before the packet is offered.
-                let sequence = links.offered(link);
-                if let Some((arrival, overtakes)) = links.offer_one(at.1, link) {
-                    in_flight.push(at, packet(peers, to, *sender, sent, arrival, sequence), overtakes);
-                }
-            }
-        }
-    }
-}
-
-/// Returns the packet over the link at index `link` of a row, to a receiver, the peer `peer` of the scene, if all peers hear all other peers. A row is
-/// ordered by sender, then run.
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "peers are counted in 16 bits, what they hold in 32")]
-fn packet<const A: usize, const L: usize>(
-    peers: usize,
-    (receiver, peer): (usize, usize),
-    link: usize,
-    sent: &[Sample<A, L>],
-    arrival: Instant,
-    sequence: u64,
-) -> Packet<A> {
-    let (sender, run) = (link / L, link % L);
-    let sample = &sent[sender];
-    Packet {
-        arrival,
-        sequence,
-        place: ((receiver * (peers - 1).next_multiple_of(4) + sender - usize::from(sender > peer)) * L + run) as u32,
-        receiver: receiver as u16,
-        position: std::array::from_fn(|axis| sample.position[axis][run]),
-        velocity: std::array::from_fn(|axis| sample.velocity[axis][run]),
     }
 }

@@ -147,6 +147,7 @@ impl Rows {
             sequence,
             place: (self.place(receiver, column) * L + run) as u32,
             receiver: receiver as u16,
+            stands_for: 0,
             position: state.position.map(weighed),
             velocity: state.velocity.map(weighed),
         }
