@@ -20,8 +20,8 @@
 //! The width of the buckets adapts to the events, so a bucket holds 4 to 16 events on average. With fewer events per bucket, searches for the next bucket
 //! cost more; with more events, sorting costs more.
 //!
-//! A short calendar has no buckets: all events lie in the front, and each is inserted there. With few events in all, buckets hold so few that finding and
-//! emptying them takes longer than the insertion.
+//! A short calendar has no buckets: all events lie in the front, and a new event is inserted there. With few events in all, a bucket would hold so few that
+//! finding and emptying the bucket takes longer than the insertion.
 
 mod slab;
 

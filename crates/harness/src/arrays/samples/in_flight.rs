@@ -48,7 +48,7 @@ pub(super) struct Packet<const A: usize> {
     /// Place of the sample at the receiver, times the number of runs, plus the run.
     pub(super) place: u32,
     pub(super) receiver: u16,
-    /// Number of packets directly before this one on its link that arrive together with it, so that no receiver ever sees them. The packet stands for them: see
+    /// Number of packets directly before this packet on its link that arrive at the same instant, so that no receiver ever sees these packets: see
     /// [`InFlight::push_in_order`].
     pub(super) stands_for: u16,
     pub(super) position: [f64; A],
@@ -100,8 +100,8 @@ impl<const A: usize> InFlight<A> {
     /// Stores a packet like [`push`](Self::push), of a link that keeps the order of packets. `latest` is the index of the latest packet of the link among
     /// the packets of its tick, and is replaced. `waits`: `true` if the packet arrives together with that packet.
     ///
-    /// Of packets that arrive together a receiver sees the newest only, so the newest takes the place of the others. Behind a packet with a long delay many
-    /// packets wait, more than a cache holds.
+    /// Of packets that arrive together a receiver sees the newest only, so the newest takes the place of the packet before. Behind a packet with a long delay
+    /// many packets wait, more than a cache holds.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 packets of a tick fit into memory")]
     pub(super) fn push_in_order(&mut self, (tick, now): (u64, Instant), packet: Packet<A>, waits: bool, latest: &mut u32) {
@@ -227,8 +227,8 @@ mod tests {
         assert_eq!(in_flight.iter().count(), 2 * 1700 + 1900 + 7);
     }
 
-    /// Packets of two links that wait in turn, beyond the wheel and within: of packets that arrive together the newest remains, and stands for those
-    /// directly before it.
+    /// Packets of two links that wait in turn, beyond the wheel and within: of packets that arrive together the newest remains, and stands for the
+    /// packets directly before.
     #[test]
     fn a_packet_stands_for_those_that_arrive_with_it() {
         let mut in_flight = InFlight::<1>::new(1);

@@ -100,7 +100,7 @@ impl Kinds {
     }
 
     /// Computes the fate of a packet of a link with the state `link`, and changes the state. Also returns whether the packet must not arrive before an
-    /// earlier packet, which the caller sees to.
+    /// earlier packet: the caller keeps the order.
     #[inline]
     pub(super) fn verdict(&mut self, now: Instant, link: &mut Remembered, words: Words, packet: PacketDraws) -> (Verdict, bool) {
         match self.at(now) {
