@@ -3,6 +3,7 @@
 //! Real [`Peer`]s with real strategies are set to a state, stepped through one frame of the timetable, and read again. Any linear strategy can be analysed in
 //! this way. A strategy with a nonlinear force, or with more memory than the shown state, is detected and refused.
 
+mod exchanges;
 mod layout;
 mod person;
 mod rigid;
@@ -11,12 +12,11 @@ use std::time::Duration;
 
 use cohaptic_peer::coordination::Role;
 use cohaptic_peer::wire::SampleKind;
-use cohaptic_peer::{
-    Acting, Contact, Device as _, Exchange, Exchanged, Gains, Hand, Held, ObjectCopy, Peer, Signal, SimulatedDevice, State, Strategy,
-};
+use cohaptic_peer::{Acting, Contact, Device as _, Exchange, Gains, Hand, Held, ObjectCopy, Peer, Signal, SimulatedDevice, State, Strategy};
 use cohaptic_scene::{Scene, Strategies};
 use cohaptic_units::Instant;
 
+use self::exchanges::{read_exchange, restore_exchange, ticks_until_exchange};
 use self::layout::{Layout, Member};
 use self::person::Person;
 use crate::cost::{PartCost, pushed_operations};
@@ -493,65 +493,6 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             }
         }
     }
-}
-
-/// Lets a peer at the beginning of a frame remember the exchanges with its device from the states `z`. `until` is the number of ticks until the next exchange.
-/// Returns the number of states.
-fn restore_exchange<const A: usize, S: Strategy<A>>(
-    member: &mut Member<A, S>,
-    exchange: Exchange,
-    until: u32,
-    z: &[f64],
-    time: f64,
-    compliance: f64,
-) -> usize {
-    let device = member.device().state();
-    let mut exchanged = Exchanged { reading: device, latest: device, held: [0.0; A], until };
-    let mut next = 0;
-    if exchange.late {
-        exchanged.latest = state(z, time);
-        next += 2 * A;
-    }
-    if exchange.holds() {
-        exchanged.reading = state(&z[next..], time);
-        exchanged.held = core::array::from_fn(|axis| z[next + 2 * A + axis] / compliance);
-        next += 3 * A;
-    }
-    member.set_exchanged(exchanged);
-    next
-}
-
-/// Writes what a peer remembers of the exchanges with its device to `z`, in the order of [`restore_exchange`]. Returns the number of states.
-fn read_exchange<const A: usize, S: Strategy<A>>(member: &Member<A, S>, exchange: Exchange, z: &mut [f64], time: f64, compliance: f64) -> usize {
-    let Some(exchanged) = member.exchanged() else { return 0 };
-    let mut next = 0;
-    if exchange.late {
-        write(&exchanged.latest, z, time);
-        next += 2 * A;
-    }
-    if exchange.holds() {
-        write(&exchanged.reading, &mut z[next..], time);
-        next += 2 * A;
-        for (entry, force) in z[next..].iter_mut().zip(exchanged.held) {
-            *entry = force * compliance;
-        }
-        next += A;
-    }
-    next
-}
-
-/// Returns the number of ticks of each node before its first exchange in the frame, indexed by node.
-fn ticks_until_exchange(timetable: &Timetable) -> Vec<u32> {
-    let mut until = vec![0; timetable.sent.len()];
-    let mut found = vec![false; timetable.sent.len()];
-    for event in &timetable.events {
-        if let Event::Tick { node, exchanges, .. } = *event
-            && !found[node]
-        {
-            (found[node], until[node]) = (exchanges, until[node] + u32::from(!exchanges));
-        }
-    }
-    until
 }
 
 /// Returns the matrix of commanded forces: one row per force in the given order, one column per state. Equal consecutive rows are kept once.
