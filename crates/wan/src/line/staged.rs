@@ -8,16 +8,17 @@
 //! A stage without configuration is `None`, and is not on the route of packets. A packet walks from stage to stage until a stage keeps the packet, drops the
 //! packet, or lets the packet out.
 
+mod propagation;
 mod route;
 
 use alloc::boxed::Box;
-use alloc::collections::{BinaryHeap, VecDeque};
+use alloc::collections::VecDeque;
 use alloc::vec::Vec;
-use core::cmp::Ordering;
 use core::time::Duration;
 
 use cohaptic_units::{Bytes, Instant};
 
+use propagation::Propagation;
 use route::{NETEM, PHYSICAL, Route, Stage};
 
 use crate::fates::fate::DropCause;
@@ -60,9 +61,7 @@ pub(crate) struct Staged<T> {
     trace: Option<PathTrace>,
     listed: Option<Box<ImpairmentStages>>,
     /// Packets in propagation. Used only in layouts with stages after propagation (netem).
-    line: BinaryHeap<Propagating<T>>,
-    /// Packets pushed to `line` so far. Orders packets with the same instant of departure from `line`.
-    line_count: u64,
+    line: Propagation<T>,
     modulation: Option<Box<ModulationStage>>,
     /// Next event and its stage, and (below) the next change of state. Both are computed by `look_ahead` after each change of the stages, because reads are
     /// more frequent than changes.
@@ -70,34 +69,6 @@ pub(crate) struct Staged<T> {
     next_change: Option<Instant>,
     /// Buffer for packets on their way out of a stage, kept for the reuse of its memory. Empty between calls.
     released: VecDeque<Carried<T>>,
-}
-
-/// A packet in propagation between two stages. The order is reversed, so the heap gives the earliest packet first.
-#[derive(Clone, Debug)]
-struct Propagating<T> {
-    until: Instant,
-    order: u64,
-    packet: Carried<T>,
-}
-
-impl<T> PartialEq for Propagating<T> {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl<T> Eq for Propagating<T> {}
-
-impl<T> PartialOrd for Propagating<T> {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl<T> Ord for Propagating<T> {
-    fn cmp(&self, other: &Self) -> Ordering {
-        (other.until, other.order).cmp(&(self.until, self.order))
-    }
 }
 
 impl<T> Staged<T> {
@@ -127,8 +98,7 @@ impl<T: Clone> Staged<T> {
             reorder: ReorderStage::new(),
             trace: None,
             listed: None,
-            line: BinaryHeap::new(),
-            line_count: 0,
+            line: Propagation::new(),
             modulation: None,
             next: None,
             next_change: None,
@@ -355,7 +325,7 @@ impl<T: Clone> Staged<T> {
                 Stage::Slots => self.slots.as_ref().and_then(|slots| slots.next_at()),
                 Stage::Propagation => {
                     let held = self.reorder.next_at();
-                    let line = self.line.peek().map(|first| first.until);
+                    let line = self.line.next_at();
                     line.map_or(held, |line| Some(held.map_or(line, |held| held.min(line))))
                 }
                 Stage::Mtu | Stage::Outage | Stage::Loss | Stage::Duplication | Stage::Corruption | Stage::Limit => None,
@@ -386,8 +356,8 @@ impl<T: Clone> Staged<T> {
             }
             Stage::Propagation => {
                 // Propagation has two sources of events. At equal instants, a packet after its propagation goes before a packet held back.
-                if self.line.peek().is_some_and(|first| first.until <= now) {
-                    released.extend(self.line.pop().map(|first| first.packet));
+                if let Some(packet) = self.line.take_due(now) {
+                    released.push_back(packet);
                 } else {
                     let mut held = VecDeque::new();
                     self.reorder.release(now, &mut held);
@@ -538,8 +508,7 @@ impl<T: Clone> Staged<T> {
         if last || (self.bucket.is_none() && self.bottleneck.is_none() && self.slots.is_none()) {
             outputs.push(Output { packet, exit: Exit::Arrives(until) });
         } else {
-            self.line_count += 1;
-            self.line.push(Propagating { until, order: self.line_count, packet });
+            self.line.push(until, packet);
         }
     }
 }
