@@ -5,10 +5,10 @@ use core::time::Duration;
 /// Most octets of a burst: 64 KiB less the room that Linux keeps for headers (`sk_gso_max_size`).
 pub(crate) const LONGEST_BURST: u64 = 65_536 - 257;
 
-/// Most of the margin for a burst.
+/// Largest margin for a burst.
 const MOST_MARGIN: Duration = Duration::from_millis(1);
 
-/// Rate of a sender as a fraction. Each acknowledgement has a rate, and few of them need the quotient.
+/// Rate of a sender as a fraction. Each acknowledgement brings a new rate, and few acknowledgements need the quotient.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pace {
     /// Octets of a flight, times a percentage.
@@ -31,7 +31,7 @@ impl Pace {
         if self.srtt == 0 {
             return u64::MAX;
         }
-        // Percents and nanoseconds. The product fits into 64 bits for flights of up to 9 gigabytes.
+        // A second has 10⁹ ns, and a percentage is a hundredth. The product fits into 64 bits for flights of up to 9 gigabytes.
         self.scaled_flight.checked_mul(10_000_000).map_or_else(
             || u64::try_from(u128::from(self.scaled_flight) * 10_000_000 / u128::from(self.srtt)).unwrap_or(u64::MAX),
             |product| product / self.srtt,

@@ -93,7 +93,8 @@ impl Addresses {
         bits == u32::MAX || bits == FIRST.0 | 0x00ff_ffff
     }
 
-    /// Returns whether `short` is a multicast address of IPv4 (RFC 1112): 224.0.0.0/4. Groups of IPv6 have no short form.
+    /// Returns whether `short` is a multicast address of IPv4 (RFC 1112): 224.0.0.0/4. Groups of IPv6 have a form of their
+    /// own, `Group`.
     #[inline]
     pub(crate) const fn is_multicast(short: u32) -> bool {
         short.wrapping_add(FIRST.0) >> 28 == 0b1110

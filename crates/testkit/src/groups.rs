@@ -74,7 +74,7 @@ impl Group {
         self.extent() == Some(OF_INTERFACE)
     }
 
-    /// Returns whether the address means something only together with an interface, as every interface has such a group of its own.
+    /// Returns whether the address is ambiguous without an interface, because every interface has a group of its own with this address.
     pub(crate) fn needs_interface(self) -> bool {
         self.extent().is_some_and(|scope| scope <= OF_LINK)
     }

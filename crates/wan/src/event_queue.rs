@@ -20,8 +20,8 @@
 //! The width of the buckets adapts to the events, so a bucket holds 4 to 16 events on average. With fewer events per bucket, searches for the next bucket
 //! cost more; with more events, sorting costs more.
 //!
-//! A short calendar has no buckets: all events lie in the front, and a new event is inserted there. With few events in all, a bucket would hold so few that
-//! finding and emptying the bucket takes longer than the insertion.
+//! A short calendar has no buckets: all events lie in the front, and a new event is inserted there. With few events in all, a bucket holds hardly
+//! any, and finding and emptying the bucket takes longer than the insertion.
 
 mod slab;
 
@@ -58,7 +58,8 @@ pub struct EventQueue<E> {
     slab: Slab<E>,
     /// Events in order, with the next events to take: the events of the current bucket, and events pushed later into this bucket or an earlier bucket.
     front: VecDeque<Entry>,
-    /// Whether all events of the calendar lie in `front`, whatever their buckets: as long as there were at most [`SHORT`] since the calendar was empty.
+    /// `true` if all events of the calendar lie in `front`, whatever their buckets. Becomes `false` when the calendar has more than [`SHORT`] events, and stays
+    /// so until the queue is a ring again.
     is_short: bool,
     /// Number of the current bucket: its instant divided by the width. Every event in `ring` and in `far` lies in a later bucket. Without meaning in a short
     /// calendar.
@@ -262,7 +263,7 @@ impl<E: Event> EventQueue<E> {
         self.ring[slot(bucket)].iter().min().map(|first| self.unpack(bucket, *first).0)
     }
 
-    /// Turns the ring into a calendar: moves all events of `ordered` into buckets.
+    /// Turns the ring into a calendar, which is short at first, and moves all events of `ordered` there.
     #[cold]
     fn become_calendar(&mut self) {
         self.in_order = false;

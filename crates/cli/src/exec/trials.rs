@@ -136,7 +136,7 @@ impl<'a> Bench<'a> {
         Plan { hosts: hosts.collect(), captures: None, ..plan.clone() }
     }
 
-    /// Prints a line. Under `--json` standard output is for the document alone, and the line tells on standard error how far the trials are.
+    /// Prints a line. Under `--json` standard output is for the document alone, so that the line goes to standard error.
     fn say(&mut self, line: &str) {
         if self.arguments.json {
             say(line);

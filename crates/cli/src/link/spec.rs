@@ -92,7 +92,8 @@ fn of_keys(spec: &[String], arguments: &LinkArguments) -> Result<(LinkModel, Ask
 ///
 /// # Errors
 ///
-/// The fault in the words or keys. A fault of TCP's connections, which links of packets do not have, is told with the command that has the fault.
+/// The fault in the words or keys. For a fault of connections of TCP, which links of packets do not have, the message names the command that has the
+/// fault.
 pub(crate) fn link_and_keys(spec: &[String]) -> Result<(LinkModel, LinkKeys), Failure> {
     let of_tcp = |name| {
         let command = "cohaptic relay --tcp --listen 127.0.0.1:7000 --to 127.0.0.1:8000";

@@ -19,7 +19,7 @@ struct Newest {
     /// Number of the present part, counted from 1.
     part: usize,
     axes: usize,
-    /// Only peer that the page of a hand is told of, indexed by hand. The page of a hand without an entry is told of all peers.
+    /// Peer whose motion alone is told to the page of a hand, indexed by hand. The page of a hand without an entry is told of all peers.
     own: Vec<usize>,
     motion: Option<Arc<Motion>>,
     /// Last written texts with the numbers of their motions, indexed by the only peer in the text. Several pages share a text of all peers, `None`.

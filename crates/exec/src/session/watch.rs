@@ -122,8 +122,8 @@ impl<'a> Watch<'a> {
             self.clock.block(Some(self.clock.now().saturating_add(signals::GROUP)), &[])?;
             self.tell_all(got.signal);
         }
-        // A waiting command has no process for the signal. The host ends as if the signal had ended the command: no command starts after Ctrl-C, and the status
-        // of the run counts no success of a command without a run.
+        // A waiting command has no process for the signal. The host ends as if the signal had ended the command: no command starts after Ctrl-C, and a
+        // command that never ran does not count as a success.
         for place in 0..self.states.len() {
             if self.states[place] == State::Waits {
                 self.end(place, signals::status(got.signal));

@@ -12,8 +12,8 @@
 //!     40    16  tag under the session key; only with a key
 //! ```
 //!
-//! A notice is shorter than every sample, 24 bytes to at least 64 and, with a key, 56 to at least 96. So a sample from a false address is amplified neither
-//! way.
+//! A notice is shorter than every sample, 24 bytes to at least 64 and, with a key, 56 to at least 96. So the answer to a sample from a
+//! false address amplifies nothing, with a key and without.
 
 use super::VERSION;
 use crate::seal::{NONCE_LEN, TAG_LEN, session_tag, verify_session_tag};

@@ -384,7 +384,7 @@ impl JoinedPeer {
         self.mismatch.as_ref()
     }
 
-    /// Returns the holder's claim to the seat of this peer, if the session has told of a holder for longer than a vanished program can be one.
+    /// Returns the error that another program keeps the seat of this peer, after notices for longer than a vanished program holds a seat. `None` before.
     #[must_use]
     pub fn seat_taken(&self) -> Option<SeatTaken> {
         let (place, patience) = (self.place, self.notices.patience());

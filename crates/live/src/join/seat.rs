@@ -10,7 +10,7 @@ const NOTICE_COUNTS: Duration = Duration::from_secs(1);
 /// Time beyond the silence of a vanished holder until the peer gives up.
 const MARGIN: Duration = Duration::from_secs(1);
 
-/// The seat is another program's, and stays that program's.
+/// Error: another program has the seat of this peer, and keeps the seat.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("the seat at place {place} is taken: for {} the session has refused the samples from here, because another program is {name}", Span(*patience))]
 pub struct SeatTaken {
@@ -18,7 +18,7 @@ pub struct SeatTaken {
     pub place: usize,
     /// Name of the peer in the scene.
     pub name: String,
-    /// Time for which the session has said so.
+    /// Time for which the session has refused the samples of this peer.
     pub patience: Duration,
 }
 

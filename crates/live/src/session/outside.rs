@@ -130,7 +130,7 @@ impl Outside {
     }
 
     /// Sends the queued samples, and then the answers. In this order a flood of hellos cannot delay samples. An answer without room in the kernel is dropped
-    /// and counted, and the peer repeats the question.
+    /// and counted, and the peer repeats the hello or sends the next sample.
     pub(super) fn flush(&mut self) {
         self.socket.flush();
         for (to, answer) in self.replies.drain(..) {

@@ -77,7 +77,7 @@ impl KeptMovement {
     }
 
     pub(crate) fn movement(self) -> Movement {
-        // A time that cannot be is a change by hand, which `verify` names.
+        // A negative or infinite time was written by hand, and `verify` names the change.
         let time = Duration::try_from_secs_f64(self.time_s).unwrap_or_default();
         Movement { distance: self.distance_m, deviation: self.beyond_m, time }
     }

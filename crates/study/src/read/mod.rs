@@ -180,7 +180,7 @@ fn refused_scene<'a>(error: &FileError, conditions: &'a Node) -> (&'a Node, Stri
     (node, if diagnostic.key().is_empty() { message.to_owned() } else { format!("{}: {message}", diagnostic.key()) })
 }
 
-/// Returns how the scene of a condition changes what all conditions share, in words; `None` if it does not.
+/// Returns how the scene of a condition changes what all conditions share, in words; `None` if all of this stays.
 fn unfit(study: &Study, text: &str, scene: &Scene) -> Option<String> {
     let other_hands = || {
         let message = || format!("the pointers are {}: expected {}", hands(scene).join(", "), study.hands.join(", "));

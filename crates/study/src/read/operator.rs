@@ -19,7 +19,7 @@ pub(super) fn read_operator(node: &Node, context: Context<'_>) -> Option<Person>
     Some(Person { movement: movement?, visual_delay: visual_delay?, reaction: reaction?, noise: noise?, crossover: crossover? })
 }
 
-/// Factor of the mean that the numbers of hardly any person exceed: e^(0.15·z) with z = 6.1.
+/// Numerator and denominator of 2.5, the factor of the mean that the numbers of hardly any person exceed: e^(0.15·z) with z = 6.1.
 const MOST: u32 = 5;
 const OVER: u32 = 2;
 

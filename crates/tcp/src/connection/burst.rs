@@ -79,7 +79,7 @@ impl Connection {
         let (unsent, open) = (self.send.buffer.end().saturating_sub(self.send.next), self.send.window_end().saturating_sub(self.send.next));
         // A last segment below the full size belongs to the burst if neither the window nor Nagle's algorithm holds it back.
         let takes_rest = unsent <= open && (self.config.nodelay || self.send.is_shut || self.send.small_end <= self.send.una);
-        // With the octets of all but one octet of a segment more, the last segment counts as a whole one.
+        // One octet less than a segment is added, so that the division below rounds up and counts a last short segment.
         let octets = if takes_rest { unsent.saturating_add(mss - 1) } else { unsent.min(open) };
         // The octets that leave while the program writes are one buffer, of at most half of the peer's largest window (`tcp_bound_to_half_wnd`). Later a
         // buffer takes octets of the next one (`tcp_grow_skb`).
@@ -113,7 +113,7 @@ impl Connection {
     }
 }
 
-/// Returns the number of whole segments of `mss` octets in `octets` octets, at most `most`. Divides only if there are fewer.
+/// Returns the number of whole segments of `mss` octets in `octets` octets, at most `most`. Divides only if there are fewer than `most`.
 fn whole(octets: u64, mss: u64, most: u32) -> u32 {
     if octets >= u64::from(most).saturating_mul(mss) { most } else { u32::try_from(octets / mss).unwrap_or(most) }
 }

@@ -22,8 +22,8 @@ impl Connection {
         self.take_segment(now, &mut segment.clone());
     }
 
-    /// Handles a segment like [`handle_segment`](Self::handle_segment), but may take the data out of the segment, which then has no data. Saves an owner that
-    /// needs the segment no longer a further reference to memory that the data shares with the sender.
+    /// Handles a segment like [`handle_segment`](Self::handle_segment), and may take the data out of `segment`. For an owner that does not need the segment
+    /// afterwards: the connection then makes no second reference to the memory of the data.
     pub fn take_segment(&mut self, now: Instant, segment: &mut Segment<'_>) {
         match self.state {
             State::Closed => self.replies.extend(segment.refusal(self.config.ttl)),

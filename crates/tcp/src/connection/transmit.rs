@@ -30,8 +30,8 @@ impl Connection {
         }
     }
 
-    /// Writes the next segment to send at `now` over `segment`, whose former content is of no importance. Returns `false` and writes nothing if no segment may
-    /// leave at present. A segment is large, and need not be moved so.
+    /// Writes the next segment to send at `now` over the content of `segment`. Returns `false` and writes nothing if no segment may leave at
+    /// present. Saves the move of a returned segment, which is large.
     #[must_use]
     pub fn poll_transmit_into(&mut self, now: Instant, segment: &mut Segment<'static>) -> bool {
         match self.choose(now) {

@@ -45,7 +45,7 @@ pub(crate) struct Ending {
 /// Instant and number of a transmission. The number orders transmissions of the same instant.
 pub(crate) type SentAt = (Instant, u64);
 
-/// Segments for which a scoreboard has memory at first.
+/// Capacity of a scoreboard after its first segment \[segments\].
 const FIRST: usize = 16;
 
 /// Segments from the first unacknowledged position to the last position sent.
@@ -105,7 +105,7 @@ impl Scoreboard {
         self.transmissions += 1;
         let order = self.transmissions;
         if self.queue.capacity() == 0 {
-            // A flight has mostly ten segments and more.
+            // Most flights have ten segments or more.
             self.queue.reserve(FIRST);
             self.by_time.reserve(FIRST);
         }

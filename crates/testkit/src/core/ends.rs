@@ -18,8 +18,8 @@ pub(crate) fn mapped(address: SocketAddr) -> SocketAddr {
     }
 }
 
-/// Returns the address of IPv4 for an address such as `::ffff:10.0.0.1`. Of other addresses of IPv6 the flow label goes, and the number of the interface except
-/// for groups.
+/// Returns the address of IPv4 for an address such as `::ffff:10.0.0.1`. Other addresses of IPv6 lose their flow label, and all addresses but those of groups
+/// lose the number of the interface.
 #[inline]
 pub(crate) fn unmapped(address: SocketAddr) -> SocketAddr {
     match address {

@@ -164,7 +164,7 @@ impl Core {
 
     /// Returns the number of an interface of a host, or `None` if the host does not have the interface.
     fn number_of(&self, host: NodeId, interface: Interface) -> Option<u32> {
-        // A host without configured interfaces has one beside loopback.
+        // A host without configured interfaces has a single interface beside loopback.
         let nodes = self.plan.nodes_of(host);
         let numbered = |is_it: &dyn Fn(NodeId) -> bool| (LOOPBACK + 1..).zip(nodes).find(|(_, node)| is_it(**node)).map(|(number, _)| number);
         match interface {

@@ -288,7 +288,7 @@ impl Core {
     fn take_watched(&mut self, parcel: Box<Parcel>) {
         #[cfg(feature = "tcp")]
         if parcel.followers.is_some() {
-            // The packets were sent before anybody looked at packets.
+            // The train was sent before anything in the run watched packets.
             return self.split(parcel, |core, parcel| core.take_watched(parcel));
         }
         if let Some(parcel) = self.wire.keep_back(parcel) {

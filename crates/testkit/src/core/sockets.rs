@@ -202,7 +202,7 @@ impl Core {
         let ip = if to.ip().is_unspecified() { Addresses::long(route.to, to.is_ipv6()) } else { to.ip() };
         let mut peer = SocketAddr::new(ip, to.port());
         if let (SocketAddr::V6(peer), SocketAddr::V6(to)) = (&mut peer, to) {
-            // The interface of a group is asked again at each datagram.
+            // Each datagram to a group looks up the interface again.
             peer.set_scope_id(if ip.is_multicast() { to.scope_id() } else { 0 });
         }
         self.sockets.get_mut(id).peer = Some(peer);

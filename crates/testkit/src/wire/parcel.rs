@@ -256,7 +256,7 @@ impl<A: Default> Spare<A> {
     const MOST: usize = 512;
     /// Largest capacity of the content of a kept parcel \[bytes\]. With [`MOST`](Self::MOST) this limits the kept memory to a megabyte.
     const LONGEST: usize = 2048;
-    /// Largest number of lists of followers kept: one for each of some connections that send at one instant.
+    /// Largest number of kept lists of followers. A list is in use for each train on its way.
     #[cfg(feature = "tcp")]
     const MOST_LISTS: usize = 64;
 

@@ -20,9 +20,9 @@ pub(crate) struct Followers {
 }
 
 impl Followers {
-    /// Segments for which a new list has memory.
+    /// Capacity of a new list \[segments\].
     const FIRST: usize = 16;
-    /// Most segments for which a list keeps its memory, about 40 kB.
+    /// Largest capacity of a list that is kept \[segments\], about 40 kB.
     const SHORT: usize = 256;
 
     pub(crate) fn push(&mut self, segment: Segment<'static>) {
@@ -79,11 +79,11 @@ impl Followers {
 }
 
 impl<A: HasFlow + Clone> Wire<A> {
-    /// Hands the segment of a parcel and its followers to their path, as one event. The run must not be [watched](Wire::is_watched), so that nobody looks at
-    /// single packets. Returns the parcel if the path takes no trains: see [`Network::handle_train`](cohaptic_wan::Network::handle_train).
+    /// Hands the segment of a parcel and its followers to their path, as one event. The run must not be [watched](Wire::is_watched), because a watched run
+    /// reports single packets. Returns the parcel if the path takes no trains: see [`Network::handle_train`](cohaptic_wan::Network::handle_train).
     pub(crate) fn offer_train(&mut self, path: Path, mut first: Box<Parcel<A>>) -> Result<(), Box<Parcel<A>>> {
         let Some(followers) = &mut first.followers else { return Err(first) };
-        // A number beyond all trains is refused by the network.
+        // The network refuses a number above that of its longest train.
         let packets = u32::try_from(followers.count + 1).unwrap_or(u32::MAX);
         followers.cost = followers.iter_mut().map(|segment| Held::cost(segment.packet_length())).sum();
         let cost = Held::cost(first.bytes.len()) + followers.cost;

@@ -28,7 +28,7 @@ pub(in crate::table) fn merge(
     let mut index = IndexWriter::create(file.path(), schema.clone())?;
     // The format has 16 bits for the index of a row group. The library states no index at all in a file with more row groups.
     let has_places = i16::try_from(parts.len()).is_ok();
-    // The type of writer that parts have too, so that the library is compiled for a single one.
+    // Parts have this type of writer too, so that the library is compiled for a single type.
     let file: &mut (dyn Write + Send) = file;
     let mut to = TrackedWrite::new(file);
     to.write_all(MAGIC)?;

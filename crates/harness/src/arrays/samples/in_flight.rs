@@ -100,8 +100,8 @@ impl<const A: usize> InFlight<A> {
     /// Stores a packet like [`push`](Self::push), of a link that keeps the order of packets. `latest` is the index of the latest packet of the link among
     /// the packets of its tick, and is replaced. `waits`: `true` if the packet arrives together with that packet.
     ///
-    /// Of packets that arrive together a receiver sees the newest only, so the newest takes the place of the packet before. Behind a packet with a long delay
-    /// many packets wait, more than a cache holds.
+    /// Of packets that arrive together a receiver sees the newest only, so the newest takes the place of the packet before. Many packets may wait
+    /// for a packet with a long delay, and would take more memory than the caches of the processor.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 packets of a tick fit into memory")]
     pub(super) fn push_in_order(&mut self, (tick, now): (u64, Instant), packet: Packet<A>, waits: bool, latest: &mut u32) {
@@ -243,7 +243,7 @@ mod tests {
         }
         push(2000, 1, 7, 2500, false);
         push(2001, 1, 8, 2500, true);
-        // A lost packet is not stood for.
+        // Packet 9 is lost, so that packet 10 does not stand for packet 8.
         push(2002, 1, 10, 2500, true);
         push(2003, 1, 11, 2500, true);
         push(2003, 0, 5, 2501, false);

@@ -435,7 +435,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
 
     #[cold]
     fn count_stale(&mut self, packet: &Packet<A>) {
-        // Sequence numbers of the packets that this one stands for have no gap, so all of these packets are stale too.
+        // The packets that `packet` stands for have lower sequence numbers, so that all of them are stale too.
         self.stale[usize::from(packet.receiver) * L + packet.place as usize % L] += 1 + u64::from(packet.stands_for);
     }
 

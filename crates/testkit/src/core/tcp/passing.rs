@@ -160,7 +160,7 @@ impl Core {
         self.follow_up(id);
     }
 
-    /// Wakes the tasks that wait for the connection, if it lets them go on.
+    /// Wakes the tasks that wait for the connection, if the connection lets them go on.
     #[inline]
     pub(super) fn wake_ends(&mut self, id: ConnId) {
         let end = self.tcp.connections.get_mut(id.0);

@@ -19,7 +19,8 @@ use crate::wire::Held;
 pub(super) struct Leaving(Option<(Path, Box<Parcel>)>);
 
 impl End {
-    /// Returns whether segments only move the connection on, without a handshake, an end, or a listener to which the connection belongs.
+    /// Returns whether the handshake is over, the connection is not in TIME-WAIT, and no listener holds the connection. Segments of such a connection need no
+    /// search for a listener.
     fn is_under_way(&self) -> bool {
         let state = self.machine.state();
         state.is_synchronised() && state != State::TimeWait && self.listener.is_none()
@@ -54,7 +55,7 @@ impl Core {
         }
     }
 
-    /// Hands the segments that leave to their link: together if the link takes trains and nobody looks at packets, otherwise one by one.
+    /// Hands the segments that leave to their link: together if the link takes trains and the run watches no packets, otherwise one by one.
     pub(super) fn depart(&mut self, id: ConnId, leaving: Leaving) {
         let Some((path, first)) = leaving.0 else { return };
         let refused = if self.wire.is_watched() { Err(first) } else { self.wire.offer_train(path, first) };
@@ -82,7 +83,7 @@ impl Core {
     pub(in crate::core) fn arrive_segments(&mut self, host: NodeId, mut first: Box<Parcel>) -> Result<(), Lost> {
         let Some(mut followers) = first.followers.take() else { return self.arrive_alone(host, first) };
         self.wire.held.remove(Held::cost(first.bytes.len()) + followers.cost());
-        // The fates of segments are recorded only where no trains are.
+        // The fates of these segments need no record: a run that records packets has no trains.
         if self.is_up(host)
             && let Some(segment) = first.bytes.segment_mut()
         {
@@ -100,14 +101,15 @@ impl Core {
         Ok(())
     }
 
-    /// Returns the connection of a train that arrives at `host`, if segments only move the connection on.
+    /// Returns the connection of a train that arrives at `host`, if the connection [is under way](End::is_under_way).
     fn under_way(&mut self, host: NodeId, segment: &Segment<'_>) -> Option<ConnId> {
         let is_here = self.is_own(host, segment.destination.ip());
         let id = self.tcp.routed(&super::route(host, segment.destination, segment.source)).filter(|_| is_here)?;
         self.tcp.end(id).is_under_way().then_some(id)
     }
 
-    /// Handles a segment of a train. `connection` is the connection of the train, as long as segments only move the connection on. Its answers go to `leaving`.
+    /// Handles a segment of a train. `connection` is the connection of the train as long as the connection is under way. Answers of the connection go to
+    /// `leaving`.
     fn arrive_in_train(&mut self, host: NodeId, segment: &mut Segment<'_>, connection: &mut Option<ConnId>, leaving: &mut Leaving) {
         let Some(id) = *connection else {
             let _ = self.take_segment(host, segment, false);
@@ -116,10 +118,10 @@ impl Core {
         let now = self.now();
         self.tcp.end_mut(id).machine.take_segment(now, segment);
         self.transmit(id, leaving);
-        // Each segment may wake, so that tasks are woken in the order of the segments.
+        // Called after each segment, so that tasks are woken in the order of the segments.
         self.wake_ends(id);
         if !self.tcp.end(id).is_under_way() {
-            // The connection is over for the segments that follow, and may be removed.
+            // `follow_up` may remove the connection, so that the next segments of the train are routed singly.
             self.depart(id, std::mem::take(leaving));
             self.follow_up(id);
             *connection = None;

@@ -74,7 +74,7 @@ impl Kind {
             Some(correlated) => Delays::Correlated(correlated),
             None => Delays::Independent(DelayStage::new(&config.delay)),
         };
-        // Outages have state beyond `Remembered`, which has one instant for a chain of losses or a chain of delays.
+        // `Remembered` has no state for outages, and a single instant, which a chain of losses in time and a chain of delays cannot share.
         if !config.outages.is_empty() || matches!((&loss, &delay), (Losses::InTime(_), Delays::Correlated(_))) {
             return None;
         }
@@ -102,7 +102,8 @@ impl Kind {
         matches!(self.delay, Delays::Independent(_)) && !matches!(self.loss, Losses::GilbertElliott(_))
     }
 
-    /// Begins a turn of this kind at an instant, after a turn of `before`. A chain of losses goes on where the kind before has one too.
+    /// Begins a turn of this kind at an instant, after a turn of `before`. A chain of losses in time goes on if `before` is
+    /// such a chain, too.
     pub(super) fn begin_turn(&mut self, at: Instant, before: &Losses) {
         if let Losses::InTime(chain) = &mut self.loss {
             chain.since = if let Losses::InTime(before) = before { before.since } else { at };
@@ -216,7 +217,7 @@ impl Kind {
         if self.loses(now, link, words, packet) {
             return Verdict::Lost;
         }
-        let Line::Free(time) = self.line else { unreachable!("delays behind a queue are drawn singly") };
+        let Line::Free(time) = self.line else { unreachable!("delays after a queue are drawn singly") };
         let leaves = now.saturating_add_nanos(time);
         if nanos == Law::UNKNOWN {
             return Verdict::Arrives(self.arrival(leaves, link, words, packet));

@@ -1,6 +1,7 @@
 //! Kinds of the links of one model: a single kind, or a kind for each state of a modulator.
 //!
-//! Links of one modulator change state at the same instants, so that they share the modulator, and a link keeps only what its packets leave behind.
+//! Links of one modulator change state at the same instants, so that all of them share the modulator, and a link keeps only the state that its packets
+//! change.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -19,7 +20,7 @@ use crate::stages::queue::Load;
 #[derive(Clone, Debug)]
 pub(super) struct Kinds {
     model: LinkModel,
-    /// Seed of the modulator. Without meaning for a model without one.
+    /// Seed of the modulator. Without meaning for a model without a modulator.
     seed: u64,
     /// Instant of the next change, or the end of time.
     next: Instant,

@@ -386,8 +386,8 @@ impl DirectLinks {
         LinkStats::counted(offered, delivered, delay_nanos, dropped)
     }
 
-    /// Returns the index of the kinds of a model and the kinds. `known` is the index if the model has kinds already; else the kinds are added. Returns
-    /// `None` if kinds have too little state for the model, or if there are too many kinds.
+    /// Returns the kinds of a model and their index. `known` is the index if the model has kinds already; else the kinds are added. Returns `None` if
+    /// [`Remembered`] has too little state for the model, or if there are too many kinds.
     fn kinds(&mut self, known: Option<usize>, seed: u64, model: &LinkModel) -> Option<(u16, &Kinds)> {
         let place = match known {
             Some(place) => place,
