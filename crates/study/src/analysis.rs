@@ -140,7 +140,7 @@ fn measure(study: &Study, units: usize, observations: &[Observation], place: usi
     let counts = |observation: &&Observation| value_of(observation).is_some() || needs_movements(name);
     let conditions = 0..study.conditions.len();
     let timed_out = conditions.clone().map(|condition| {
-        // Both counts leave out trials without a value, so that the share describes the same trials as the mean.
+        // Both counts leave out trials without a value, so that the share describes the same trials as the mean. A throughput is that of all trials.
         let trials = |wanted: &dyn Fn(&Observation) -> bool| chosen(observations, condition, wanted).into_iter().filter(counts).count() as u64;
         Share::of(trials(&|observation| observation.timed_out), trials(&|_| true))
     });

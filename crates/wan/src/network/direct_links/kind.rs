@@ -102,8 +102,8 @@ impl Kind {
         matches!(self.delay, Delays::Independent(_)) && !matches!(self.loss, Losses::GilbertElliott(_))
     }
 
-    /// Begins a turn of this kind at an instant, after a turn of `before`. A chain of losses in time goes on if `before` is
-    /// such a chain, too.
+    /// Begins a turn of this kind at an instant, after a turn of `before`. A chain of losses in time goes on if `before` is such
+    /// a chain, too.
     pub(super) fn begin_turn(&mut self, at: Instant, before: &Losses) {
         if let Losses::InTime(chain) = &mut self.loss {
             chain.since = if let Losses::InTime(before) = before { before.since } else { at };
