@@ -92,13 +92,13 @@ fn of_keys(spec: &[String], arguments: &LinkArguments) -> Result<(LinkModel, Ask
 ///
 /// # Errors
 ///
-/// The fault in the words or keys. For a fault of connections of TCP, which links of packets do not have, the message names the command that has the
-/// fault.
+/// The fault in the words or keys. For a word of connections of TCP, which links of packets do not have, the message names the command that has the
+/// word.
 pub(crate) fn link_and_keys(spec: &[String]) -> Result<(LinkModel, LinkKeys), Failure> {
     let of_tcp = |name| {
         let command = "cohaptic relay --tcp --listen 127.0.0.1:7000 --to 127.0.0.1:8000";
         Failure::Input(format!(
-            "{name} is a fault of connections of TCP, and this link carries packets: expected another word, or {command} {name} …"
+            "{name} is a word of links for connections of TCP, and this link carries packets: expected another word, or {command} {name} …"
         ))
     };
     // Only a refused spec is searched for such a name: words of tc-netem may be shortened, and a valid spec decides itself what its words mean.

@@ -324,7 +324,7 @@ fn a_wrong_call_is_told_with_what_was_expected() {
         ("exec 'delay 1ms' --back '' -- true", "an empty text is no link"),
         (
             "exec 'delay 1ms stall 2s' -- true",
-            "stall is a fault of connections of TCP, and this link carries packets: expected another word, or cohaptic relay --tcp",
+            "stall is a word of links for connections of TCP, and this link carries packets: expected another word, or cohaptic relay --tcp",
         ),
     ] {
         desk.cohaptic_within(PATIENCE, line).assert_refused(125, &[part]);

@@ -113,7 +113,7 @@ const OTHERS: &[Bad] = &[
     ),
     bad(
         "relay --listen localhost:0 --to localhost:9 delay 20ms stall 2s",
-        "stall is a fault of connections of TCP, and this link carries packets: expected another word, or cohaptic relay --tcp --listen 127.0.0.1:7000 --to 127.0.0.1:8000 stall …",
+        "stall is a word of links for connections of TCP, and this link carries packets: expected another word, or cohaptic relay --tcp --listen 127.0.0.1:7000 --to 127.0.0.1:8000 stall …",
     ),
     bad(
         "relay --tcp --listen localhost:0 --to localhost:9 stall x",

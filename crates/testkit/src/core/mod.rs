@@ -44,7 +44,7 @@ pub(crate) use ends::{mapped, unmapped};
 use face::Face;
 use forwarding::Forwarding;
 pub(crate) use forwarding::shown;
-pub(crate) use multicast::{Interface, Sending};
+pub(crate) use multicast::{Interface, MulticastSettings};
 use sockets::Sockets;
 use waking::Woken;
 

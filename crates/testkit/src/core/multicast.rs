@@ -38,7 +38,7 @@ impl Interface {
 
 /// Settings of a socket for multicast over one version of IP.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sending {
+pub(crate) struct MulticastSettings {
     /// Time to live, or limit of hops, of sent datagrams. 0 keeps a datagram on its host. Without multicast routers every larger value means the own network.
     pub(crate) ttl: u32,
     /// `true` if sockets of the own host hear the datagrams.
@@ -49,7 +49,7 @@ pub(crate) struct Sending {
     pub(crate) named: Ipv4Addr,
 }
 
-impl Default for Sending {
+impl Default for MulticastSettings {
     /// Returns the defaults of Linux.
     fn default() -> Self {
         Self { ttl: 1, loops: true, interface: 0, named: Ipv4Addr::UNSPECIFIED }
@@ -60,7 +60,7 @@ impl Default for Sending {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Multicast {
     /// Settings by version of IP: IPv4, IPv6.
-    pub(crate) sending: [Sending; 2],
+    pub(crate) settings: [MulticastSettings; 2],
     /// Number of the interface in the address of a socket that is bound to a group of a link; 0 for other sockets.
     pub(super) zone: u32,
     joined: Vec<Joined>,
@@ -85,8 +85,8 @@ struct Joined {
 
 impl SocketState {
     /// Returns the settings of the socket for multicast over a version of IP, by default those of Linux.
-    pub(super) fn sending(&self, is_six: bool) -> Sending {
-        self.multicast.as_deref().map(|multicast| multicast.sending[usize::from(is_six)]).unwrap_or_default()
+    pub(super) fn multicast_settings(&self, is_six: bool) -> MulticastSettings {
+        self.multicast.as_deref().map(|multicast| multicast.settings[usize::from(is_six)]).unwrap_or_default()
     }
 }
 
@@ -101,9 +101,9 @@ impl Core {
     /// # Errors
     ///
     /// `ENOPROTOOPT`, as with Linux, for IPv6 and a socket of IPv4.
-    pub(crate) fn sending(&mut self, id: SocketId, is_six: bool) -> io::Result<&mut Sending> {
+    pub(crate) fn multicast_settings(&mut self, id: SocketId, is_six: bool) -> io::Result<&mut MulticastSettings> {
         self.check_version(id, is_six)?;
-        Ok(&mut self.multicast(id).sending[usize::from(is_six)])
+        Ok(&mut self.multicast(id).settings[usize::from(is_six)])
     }
 
     /// Selects the interface for sent datagrams.
@@ -114,10 +114,10 @@ impl Core {
     pub(crate) fn select_interface(&mut self, id: SocketId, is_six: bool, interface: Interface) -> io::Result<()> {
         let host = self.sockets.get(id).host;
         let number = self.number_of(host, interface);
-        let sending = self.sending(id, is_six)?;
+        let settings = self.multicast_settings(id, is_six)?;
         let Some(number) = number else { return if is_six { Errno::NoDevice.fail() } else { Errno::AddrNotAvailable.fail() } };
-        sending.interface = if interface.is_any() { 0 } else { number };
-        sending.named = if let Interface::Address(address) = interface { address } else { Ipv4Addr::UNSPECIFIED };
+        settings.interface = if interface.is_any() { 0 } else { number };
+        settings.named = if let Interface::Address(address) = interface { address } else { Ipv4Addr::UNSPECIFIED };
         Ok(())
     }
 
@@ -214,7 +214,7 @@ impl Core {
         if zone != 0 && self.node_of(host, zone).is_none() {
             return Errno::NetworkUnreachable.fail();
         }
-        match (at, if zone == 0 { socket.sending(is_six).interface } else { zone }) {
+        match (at, if zone == 0 { socket.multicast_settings(is_six).interface } else { zone }) {
             (Some(at), _) if Addresses::is_loopback(at, is_six) => Ok(at),
             (Some(at), _) => self.check_source(host, at, group.short, is_six).map(|()| at),
             (None, LOOPBACK) => Ok(Addresses::LOOPBACK[usize::from(is_six)]),
@@ -247,7 +247,7 @@ impl Core {
     /// Sends a datagram to the members of the group.
     pub(super) fn send_to_group(&mut self, id: SocketId, host: NodeId, parcel: Box<Parcel>) {
         let ends = parcel.addresses;
-        let Sending { ttl, loops, .. } = self.sockets.get(id).sending(ends.is_six);
+        let MulticastSettings { ttl, loops, .. } = self.sockets.get(id).multicast_settings(ends.is_six);
         let stays = ends.group().is_some_and(Group::stays_on_host) || Addresses::is_loopback(ends.from, ends.is_six);
         if ttl > 0 && !stays {
             // The nodes of hosts with several interfaces are looked up by their host. Each copy takes a different link.

@@ -192,7 +192,7 @@ impl Core {
         // As with Linux, a group of a link needs an interface in its address, or in the settings of the socket.
         if let SocketAddr::V6(to) = to
             && to.scope_id() == 0
-            && socket.sending(true).interface == 0
+            && socket.multicast_settings(true).interface == 0
             && Group::of(IpAddr::V6(*to.ip())).is_some_and(Group::needs_interface)
         {
             return Errno::InvalidInput.fail();

@@ -4,7 +4,7 @@ use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 
 use super::UdpSocket;
-use crate::core::{Interface, Sending};
+use crate::core::{Interface, MulticastSettings};
 use crate::errno::Errno;
 
 impl UdpSocket {
@@ -14,7 +14,7 @@ impl UdpSocket {
     ///
     /// If the host of the socket has crashed.
     pub fn multicast_ttl_v4(&self) -> io::Result<u32> {
-        self.multicast(false, |sending| sending.ttl)
+        self.multicast(false, |settings| settings.ttl)
     }
 
     /// Sets the time to live of multicast over IPv4, from 0 to 255. With 0 a datagram reaches the own host alone. All other values mean the network of the
@@ -33,7 +33,7 @@ impl UdpSocket {
     ///
     /// `EOPNOTSUPP` for a socket of IPv4, as with Linux, or if the host of the socket has crashed.
     pub fn multicast_hops_v6(&self) -> io::Result<u32> {
-        self.multicast(true, |sending| sending.ttl)
+        self.multicast(true, |settings| settings.ttl)
     }
 
     /// Sets the limit of hops of multicast over IPv6, from 0 to 255: see [`UdpSocket::set_multicast_ttl_v4`].
@@ -49,13 +49,13 @@ impl UdpSocket {
         if ttl > 255 {
             return Errno::InvalidInput.fail();
         }
-        self.open(|core| core.sending(self.id, is_six).map(|sending| sending.ttl = ttl))?
+        self.open(|core| core.multicast_settings(self.id, is_six).map(|settings| settings.ttl = ttl))?
     }
 
     /// Returns a setting for multicast over a version of IP.
-    fn multicast<T>(&self, is_six: bool, look: impl FnOnce(&Sending) -> T) -> io::Result<T> {
+    fn multicast<T>(&self, is_six: bool, look: impl FnOnce(&MulticastSettings) -> T) -> io::Result<T> {
         // As with Linux, reading and writing an option of the other version fail with different numbers.
-        self.open(|core| core.sending(self.id, is_six).map_or_else(|_| Errno::NotSupported.fail(), |sending| Ok(look(sending))))?
+        self.open(|core| core.multicast_settings(self.id, is_six).map_or_else(|_| Errno::NotSupported.fail(), |settings| Ok(look(settings))))?
     }
 
     /// Returns whether sockets of the own host hear the multicast of this socket over IPv4. The default is `true`, as with Linux.
@@ -64,7 +64,7 @@ impl UdpSocket {
     ///
     /// If the host of the socket has crashed.
     pub fn multicast_loop_v4(&self) -> io::Result<bool> {
-        self.multicast(false, |sending| sending.loops)
+        self.multicast(false, |settings| settings.loops)
     }
 
     /// Sets whether sockets of the own host hear the multicast of this socket over IPv4.
@@ -73,7 +73,7 @@ impl UdpSocket {
     ///
     /// If the host of the socket has crashed.
     pub fn set_multicast_loop_v4(&self, on: bool) -> io::Result<()> {
-        self.open(|core| core.sending(self.id, false).map(|sending| sending.loops = on))?
+        self.open(|core| core.multicast_settings(self.id, false).map(|settings| settings.loops = on))?
     }
 
     /// Returns whether sockets of the own host hear the multicast of this socket over IPv6. The default is `true`, as with Linux.
@@ -82,7 +82,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::multicast_hops_v6`].
     pub fn multicast_loop_v6(&self) -> io::Result<bool> {
-        self.multicast(true, |sending| sending.loops)
+        self.multicast(true, |settings| settings.loops)
     }
 
     /// Sets whether sockets of the own host hear the multicast of this socket over IPv6.
@@ -91,7 +91,7 @@ impl UdpSocket {
     ///
     /// `ENOPROTOOPT` for a socket of IPv4, as with Linux, or if the host of the socket has crashed.
     pub fn set_multicast_loop_v6(&self, on: bool) -> io::Result<()> {
-        self.open(|core| core.sending(self.id, true).map(|sending| sending.loops = on))?
+        self.open(|core| core.multicast_settings(self.id, true).map(|settings| settings.loops = on))?
     }
 
     /// Returns the address by which the interface for multicast over IPv4 was selected; unspecified if the host chooses.
@@ -100,7 +100,7 @@ impl UdpSocket {
     ///
     /// If the host of the socket has crashed.
     pub fn multicast_if_v4(&self) -> io::Result<Ipv4Addr> {
-        self.multicast(false, |sending| sending.named)
+        self.multicast(false, |settings| settings.named)
     }
 
     /// Selects the interface for multicast over IPv4: the interface with the address `interface`, or the uplink with the unspecified address. Datagrams of a socket
@@ -119,7 +119,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::multicast_hops_v6`].
     pub fn multicast_if_v6(&self) -> io::Result<u32> {
-        self.multicast(true, |sending| sending.interface)
+        self.multicast(true, |settings| settings.interface)
     }
 
     /// Selects the interface for multicast over IPv6 by its number: 1 is loopback, the interfaces of the host have the numbers from 2 on in the order of

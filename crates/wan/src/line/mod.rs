@@ -198,11 +198,11 @@ impl<P, T: Clone> Line<P, T> {
 
     /// Takes `packets` packets at `now`, and returns the arrival of all of them. The line must be [constant](Line::is_constant).
     #[inline]
-    pub(crate) fn offer_train(&mut self, now: Instant, packets: u32) -> Option<Instant> {
-        let Outcome::Arrives(at) = self.offer(now, None) else { return None };
+    pub(crate) fn offer_train(&mut self, now: Instant, packets: u32) -> Instant {
+        let Outcome::Arrives(at) = self.offer(now, None) else { unreachable!("a constant line keeps no packet and loses none") };
         // `offer` has counted the first packet.
         self.flow.offered += u64::from(packets.saturating_sub(1));
-        Some(at)
+        at
     }
 
     /// Counts the arrival of further packets of a train, with the instants of [`Line::deliver`]. Not inlined, because the compiler would otherwise compute the

@@ -315,7 +315,7 @@ impl<P: Clone> Network<P> {
         }
         let line = &mut self.lines.links[place];
         let sequence = line.offered();
-        let Some(at) = line.offer_train(now, packets) else { return Err(payload) };
+        let at = line.offer_train(now, packets);
         let packet = InNetwork { sequence, offered: now, entered: now, path, size: SizeAndMarks::of_train(packets), payload };
         self.traffic.schedule(at, LineId::Link(link), packet);
         Ok(at)

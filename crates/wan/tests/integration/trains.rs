@@ -101,6 +101,10 @@ fn a_link_of_constant_delay_takes_trains_and_others_do_not() {
     assert_eq!(taken(network(LinkConfig::default()), 2), Err(7));
     let nowhere = Path { from: path.to, to: path.to };
     assert_eq!(network(constant()).handle_train(Instant::ZERO, nowhere, 2, 7), Err(7));
+    // An instant before that of an earlier call is refused.
+    let mut late = network(constant());
+    late.handle_timeout(Instant::ZERO + delay).unwrap();
+    assert_eq!(late.handle_train(Instant::ZERO, path, 2, 7), Err(7));
     let filtered = network(constant()).with_filter(path.from, path.to, |_| false).unwrap();
     assert_eq!(taken(filtered, 2), Err(7));
 }

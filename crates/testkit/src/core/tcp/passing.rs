@@ -24,14 +24,14 @@ impl Core {
             return Err(Lost::HostDown);
         }
         match packet.segment_mut() {
-            Some(segment) => self.take_segment(host, segment, marked),
+            Some(segment) => self.arrive_whole(host, segment, marked),
             // A packet that a link has damaged.
-            None => self.take_segment(host, &mut Segment::parse(packet).map_err(|_| Lost::Checksum)?, marked),
+            None => self.arrive_whole(host, &mut Segment::parse(packet).map_err(|_| Lost::Checksum)?, marked),
         }
     }
 
     /// Handles a segment that has arrived whole, whose connection takes the data.
-    pub(super) fn take_segment(&mut self, host: NodeId, segment: &mut Segment<'_>, marked: bool) -> Result<(), Lost> {
+    pub(super) fn arrive_whole(&mut self, host: NodeId, segment: &mut Segment<'_>, marked: bool) -> Result<(), Lost> {
         if !self.is_own(host, segment.destination.ip()) {
             return Err(Lost::NoSuchAddress);
         }
@@ -147,7 +147,7 @@ impl Core {
     pub(in crate::core) fn take_from_loopback(&mut self) -> bool {
         let Some((host, mut segment)) = self.tcp.loopback.pop_front() else { return false };
         // Fates of packets are recorded for links only. Loopback is not part of the network.
-        let _ = self.take_segment(host, &mut segment, false);
+        let _ = self.arrive_whole(host, &mut segment, false);
         true
     }
 

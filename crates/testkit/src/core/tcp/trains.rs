@@ -112,7 +112,7 @@ impl Core {
     /// `leaving`.
     fn arrive_in_train(&mut self, host: NodeId, segment: &mut Segment<'_>, connection: &mut Option<ConnId>, leaving: &mut Leaving) {
         let Some(id) = *connection else {
-            let _ = self.take_segment(host, segment, false);
+            let _ = self.arrive_whole(host, segment, false);
             return;
         };
         let now = self.now();

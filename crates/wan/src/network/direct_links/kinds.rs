@@ -72,7 +72,7 @@ impl Kinds {
     }
 
     /// Returns the kind of the links for a packet that is offered `now`. Returns `None` if the modulator changes while the packet is in transmission.
-    /// Instants must not go back.
+    /// Instants must not go back, over all links together.
     #[inline(always)]
     pub(super) fn at(&mut self, now: Instant) -> Option<&mut Kind> {
         if self.next <= now {
@@ -91,7 +91,8 @@ impl Kinds {
     #[cold]
     fn pass(&mut self, now: Instant) {
         let Some(states) = &mut self.states else { return };
-        while self.next <= now {
+        // A modulator without further changes has the last of all instants as the next change.
+        while self.next <= now && self.next < Instant::MAX {
             states.change();
             let before = core::mem::replace(&mut self.present, states.present());
             let losses = self.all[before].loss.clone();
