@@ -1,10 +1,12 @@
 """Devices in Python: the gate, the peer, the protocol, the loop with its ends, and a device beside `cohaptic live`."""
 
+import contextlib
 import json
 import math
 import os
 import random
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -170,6 +172,37 @@ def test_the_bytes_are_those_of_the_page(joining: Joining) -> None:
     plain = joining.open(expected["to the peer"])
     assert plain is not None
     assert peer.decode(told, plain) == Sample(0, 7, 56 * MS, [(-0.5, 0.125)])
+
+
+def test_a_notice_of_a_taken_place_is_counted_and_no_other_one(joining: Joining) -> None:
+    sealed, plain = blocks()["taken"], blocks()["taken without a key"]
+    for keyed, notice in ((joining, sealed), (None, plain)):
+        me = Peer(joining.session, Mechanics(), keyed, 0)
+        assert me.take(notice, 1)
+        assert (me.taken, me.ignored, me.heard_at) == (1, 0, 0)
+        # Another session, place, nonce or tag, a byte more, and the notice of the other kind of session.
+        changed = [bytes(byte ^ (k == at) for k, byte in enumerate(notice)) for at in range(len(notice))]
+        for other in (*changed, notice + b"\0", notice[:-1], plain if keyed else sealed):
+            assert not me.take(other, 1)
+        assert (me.taken, me.ignored) == (1, len(notice) + 3)
+
+
+def test_a_device_learns_that_another_program_has_its_place() -> None:
+    """A session on the loopback interface that refuses every sample. It answers in the thread of the peer, so that no notice comes too late."""
+    notice = peer.datagrams.NOTICE.pack(b"CHPS", 1, 0, 7, 1, 0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as door:
+        door.bind(("127.0.0.1", 0))
+        door.setblocking(False)
+        grip = Grip()
+
+        def answer() -> Reading:
+            with contextlib.suppress(BlockingIOError):
+                door.sendto(notice, door.recvfrom(peer.client.BUFFER_LEN)[1])
+            return Reading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+        grip.read = answer
+        joined = join(grip, f"127.0.0.1:{door.getsockname()[1]}", session=7, place=1, duration=0.1)
+    assert (joined.sent, joined.taken, joined.ignored, joined.received) == (13, 13, 0, {0: 0})
 
 
 def test_a_hello_may_tell_scene_and_label(joining: Joining) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from .datagrams import Joining, Sample, Session, decode, encode
+from .datagrams import Joining, Sample, Session, decode, encode, is_notice
 from .mechanics import Attitude, Body, Matrix, State, Turn, Vector, apply, cross, transposed
 
 SILENCE_NS = 1_000_000_000
@@ -104,7 +104,7 @@ class Peer:
         """Share of FC that is in force, 0 to 1."""
         self.on_hand = [0.0] * session.axes
         """Force on the device until the next exchange [N]."""
-        self.sent = self.ignored = 0
+        self.sent = self.ignored = self.taken = 0
         self.joinings = 1 if joining else 0
         self.heard_at = now
         self._rejoining: Joining | None = None
@@ -128,6 +128,9 @@ class Peer:
             self.joining, self._rejoining, self.heard_at = self._rejoining, None, now
             self.joinings += 1
             self._forget_numbers()
+            return True
+        if is_notice(self.session, self.joining, datagram):
+            self.taken += 1
             return True
         plain = self.joining.open(datagram) if self.joining else datagram
         sample = decode(self.session, plain) if plain else None

@@ -20,6 +20,8 @@ HELLO = struct.Struct("<4sHHQII16sQ8s16x")
 """Magic, version, 0, session, place, 0, client nonce, fingerprint of the scene, label."""
 WELCOME = struct.Struct("<4sHBBQII16s16sQQ")
 """Magic, version, axes, 1 if the object turns, session, place, peers, both nonces, tick [ns], update [ns]."""
+NOTICE = struct.Struct("<4sHHQII")
+"""Magic, version, 0, session, place, 0. With a key, nonce of the client and tag follow."""
 NONCE_LEN = TAG_LEN = 16
 
 
@@ -95,6 +97,15 @@ def decode(session: Session, datagram: bytes) -> Sample | None:
     if attitude and abs(math.fsum(q * q for q in attitude.quaternion) - 1) > 2**-20:
         return None
     return Sample(sender, number, sent, states, attitude)
+
+
+def is_notice(session: Session, joining: Joining | None, datagram: bytes) -> bool:
+    """Returns whether the session says that another program has the place of this peer. ``joining`` is that of the peer in a session with a key."""
+    notice = NOTICE.pack(b"CHPS", 1, 0, session.number, session.place, 0) + (joining.nonce if joining else b"")
+    # Samples differ here, and cost no tag.
+    if not datagram.startswith(notice):
+        return False
+    return hmac.compare_digest(datagram, notice + (tag(joining.key, notice) if joining else b""))
 
 
 class Joining:

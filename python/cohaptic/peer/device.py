@@ -92,6 +92,8 @@ class Joined:
     """How fast the copy is at the end [m/s]."""
     received: dict[int, int]
     """Samples received from each other place."""
+    taken: int
+    """Notices that another program has the place. The session sends one for each sample that it refuses for this reason."""
 
 
 def join(
@@ -188,6 +190,7 @@ def join(
         position=[x for x, _ in peer.copy.states],
         velocity=[v for _, v in peer.copy.states],
         received={place: other.received for place, other in peer.others.items()},
+        taken=peer.taken,
     )
 
 
