@@ -35,8 +35,17 @@ impl StudyFolder {
         Ok(bytes)
     }
 
-    /// Reads the records of all trials, in the order of their codes.
+    /// Reads the records of all trials, in the order of their codes, with movements for the records of earlier versions.
     pub(crate) fn kept_trials(&self) -> Result<Vec<KeptTrial>, StudyError> {
+        let with_movements = |trial: KeptTrial| {
+            let record = trial.record.with_movements(&self.trial(trial.ended.plan.code))?;
+            Ok(KeptTrial { record, ..trial })
+        };
+        self.recorded_trials()?.into_iter().map(with_movements).collect()
+    }
+
+    /// Reads the records of all trials as they are on the disk, in the order of their codes.
+    pub(crate) fn recorded_trials(&self) -> Result<Vec<KeptTrial>, StudyError> {
         let mut trials = Vec::new();
         for (place, group) in self.groups().iter().enumerate() {
             for ended in group.ended() {

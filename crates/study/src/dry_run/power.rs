@@ -111,13 +111,20 @@ impl StudyFolder {
     }
 }
 
-/// Returns a further run: the kept figures, or the figures of a new run, which are then kept. `None` if the watch stopped the run.
+/// Returns a further run: the kept figures, or the figures of a new run, which are then kept. Figures of an earlier version are replaced.
+/// `None` if the watch stopped the run.
 fn run_of(study: &Study, number: u64, path: &Path, watch: &dyn Watch) -> Result<Option<Run>, StudyError> {
     if path.exists() {
         let text = read_text(path).map_err(StudyError::file("read", path))?;
-        let run: Run = serde_json::from_str(&text).map_err(|error| StudyError::damaged(path, error.to_string()))?;
-        // The shape is checked here, because `counted` indexes the figures by measure and condition.
-        return if run.is_of(study) { Ok(Some(run)) } else { Err(StudyError::damaged(path, "it has figures of other measures or conditions")) };
+        let damaged = |error: serde_json::Error| StudyError::damaged(path, error.to_string());
+        let kept: serde_json::Value = serde_json::from_str(&text).map_err(damaged)?;
+        // An earlier version kept no timeouts. Such a run is computed again, from the same seed.
+        let is_earlier = kept.get("differences").is_some() && kept.get("timed_out").is_none();
+        if !is_earlier {
+            let run: Run = serde_json::from_value(kept).map_err(damaged)?;
+            // The shape is checked here, because `counted` indexes the figures by measure and condition.
+            return if run.is_of(study) { Ok(Some(run)) } else { Err(StudyError::damaged(path, "it has figures of other measures or conditions")) };
+        }
     }
     // A seed of its own gives the dry run other persons, other seeds of trials and other shuffled orders.
     let seed = Stream::new(study.seed, b"study dry run").packet(number).first(Purpose::Study) >> 11;

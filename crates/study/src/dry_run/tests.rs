@@ -145,6 +145,17 @@ fn a_longer_delay_is_found_and_the_kept_runs_are_the_same_again() {
     fs::write(folder.path().join("dry-runs/00004.json"), "{\"differences\":[[null]],\"timed_out\":[]}").unwrap();
     let refused = kept.power(5, &NoWatch).unwrap_err().to_string();
     assert!(refused.contains("00004.json") && refused.contains("other measures"), "{refused}");
+    // A file of a version that kept no timeouts is computed again, to the same bytes.
+    let third = folder.path().join("dry-runs/00003.json");
+    let text = fs::read_to_string(&third).unwrap();
+    let (differences, _) = text.split_once(",\"timed_out\"").unwrap();
+    fs::write(&third, format!("{differences}}}\n")).unwrap();
+    assert_eq!(kept.power(4, &StopAfter(AtomicUsize::new(0))).unwrap(), None);
+    assert_eq!(kept.power(4, &NoWatch).unwrap().as_ref(), Some(&power));
+    assert_eq!(fs::read_to_string(&third).unwrap(), text);
+    fs::write(&third, "{}\n").unwrap();
+    let refused = kept.power(4, &NoWatch).unwrap_err().to_string();
+    assert!(refused.contains("00003.json") && refused.contains("missing field"), "{refused}");
     let lines = power_lines(&study, &power);
     assert_eq!(lines.len(), 3);
     assert!(lines[1].starts_with("task_time_s  "), "{lines:?}");

@@ -54,7 +54,8 @@ pub struct TrialRecord {
     pub time_s: f64,
     /// Values of the measures, in the order of [`Study::measures`](crate::Study::measures); `None` for a measure without a value.
     pub values: Vec<(String, Option<f64>)>,
-    /// Movements to reached targets, for a study whose measures need the movements of several trials together; otherwise empty.
+    /// Movements to reached targets, for a study whose measures need the movements of several trials together; otherwise empty. Also empty in the record of
+    /// an earlier version, which kept no movements.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub movements: Vec<KeptMovement>,
 }
@@ -113,6 +114,28 @@ impl TrialRecord {
         serde_json::from_str(&text).map_err(|error| StudyError::damaged(&path, error.to_string()))
     }
 
+    /// Returns the record with the movements that an earlier version did not keep, taken from a replay of scene and inputs. A record that has all movements, or
+    /// needs none, is returned unchanged.
+    ///
+    /// # Errors
+    ///
+    /// [`StudyError::Damaged`] if the replay has another outcome, time or value than the record; errors of the replay.
+    pub(crate) fn with_movements(self, folder: &Path) -> Result<Self, StudyError> {
+        // A trial in which no target was reached has no movements either. Its replay finds none.
+        if !self.movements.is_empty() || !self.values.iter().any(|(name, _)| needs_movements(name)) {
+            return Ok(self);
+        }
+        let replayed = Replayed::of(folder)?;
+        // Movements of another replay would not be those of the trial whose measures are in the record.
+        match self.differences_to(&replayed).first() {
+            Some(difference) => {
+                let message = format!("it has no movements, which earlier versions did not keep, and its replay is of another trial: {difference}");
+                Err(StudyError::damaged(&folder.join(RECORD), message))
+            }
+            None => Ok(Self { movements: replayed.movements, ..self }),
+        }
+    }
+
     /// Returns the value of a measure; `None` for a measure without a value.
     pub(crate) fn value(&self, name: &str) -> Option<f64> {
         self.values.iter().find(|(known, _)| known == name).and_then(|(_, value)| *value)
@@ -120,30 +143,37 @@ impl TrialRecord {
 
     /// Returns the differences between the record and the replay of the trial's scene and inputs, in words.
     pub(crate) fn differences(&self, folder: &Path) -> Result<Vec<String>, StudyError> {
-        let Replayed { outcome, time_s, values, movements } = Replayed::of(folder)?;
+        Ok(self.differences_to(&Replayed::of(folder)?))
+    }
+
+    fn differences_to(&self, replayed: &Replayed) -> Vec<String> {
+        let Replayed { outcome, time_s, values, movements } = replayed;
         let mut differences = Vec::new();
         let mut compare = |name: &str, kept: String, replayed: String| {
             if kept != replayed {
                 differences.push(format!("{name} is {kept} in the record and {replayed} in the replay"));
             }
         };
-        compare("outcome", self.outcome.clone(), outcome);
+        compare("outcome", self.outcome.clone(), outcome.clone());
         // Numbers are compared as their shortest texts, which differ whenever two finite numbers differ, and serve the message too.
         compare("time_s", format!("{:?}", self.time_s), format!("{time_s:?}"));
-        compare("a movement", format!("{:?}", self.movements), format!("{movements:?}"));
+        // An earlier version kept no movements, so their absence is no change of the record.
+        if !self.movements.is_empty() {
+            compare("a movement", format!("{:?}", self.movements), format!("{movements:?}"));
+        }
         let text = |value: &Option<f64>| value.map_or_else(|| "nothing".to_owned(), |value| format!("{value:?}"));
         // The longer list sets the end, so that a missing measure and an additional one are both found.
         for place in 0..self.values.len().max(values.len()) {
             let name = |values: &[(String, Option<f64>)]| values.get(place).map(|(name, _)| name.clone());
             let value = |values: &[(String, Option<f64>)]| values.get(place).map_or_else(|| "not there".to_owned(), |(_, value)| text(value));
-            let shown = name(&self.values).or_else(|| name(&values)).unwrap_or_default();
-            if name(&self.values) == name(&values) {
-                compare(&shown, value(&self.values), value(&values));
+            let shown = name(&self.values).or_else(|| name(values)).unwrap_or_default();
+            if name(&self.values) == name(values) {
+                compare(&shown, value(&self.values), value(values));
             } else {
-                compare("a measure", name(&self.values).unwrap_or_default(), name(&values).unwrap_or_default());
+                compare("a measure", name(&self.values).unwrap_or_default(), name(values).unwrap_or_default());
             }
         }
-        Ok(differences)
+        differences
     }
 }
 

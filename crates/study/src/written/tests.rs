@@ -297,6 +297,36 @@ fn the_throughput_of_a_group_is_that_of_the_movements_of_all_its_trials() {
     assert!(found.iter().any(|difference| difference.starts_with("G01-002: a movement is ")), "{found:?}");
 }
 
+/// An earlier version kept no movements. The report takes the movements from replays, and refuses a replay that is not the recorded trial.
+#[test]
+fn records_without_movements_get_them_from_a_replay() {
+    let at = tempfile::tempdir().unwrap();
+    let study = Study { measures: vec!["throughput_bit_s".to_owned()], questions: Vec::new(), ..short() };
+    let mut folder = StudyFolder::open_dry(study, at.path(), PROGRAM).unwrap();
+    assert!(folder.play_dry(&NoWatch).unwrap());
+    let (trials, analysis, report) = (folder.kept_trials().unwrap(), folder.analysis().unwrap(), fs::read(at.path().join("report.html")).unwrap());
+    assert!(analysis.measures[0].rows.len() == 2, "{analysis:?}");
+    let file = |trial: &str| at.path().join("trials").join(trial).join("trial.json");
+    for name in names(&at.path().join("trials")) {
+        let mut record: serde_json::Value = serde_json::from_slice(&fs::read(file(&name)).unwrap()).unwrap();
+        assert!(record.as_object_mut().unwrap().remove("movements").is_some(), "{record:#}");
+        fs::write(file(&name), record.to_string()).unwrap();
+    }
+    assert_eq!((folder.kept_trials().unwrap(), folder.analysis().unwrap()), (trials, analysis));
+    folder.write_tables().unwrap();
+    assert!(fs::read(at.path().join("report.html")).unwrap() == report);
+    assert_eq!(folder.verify().unwrap().differences, [""; 0]);
+    let text = fs::read_to_string(file("G02-001")).unwrap();
+    fs::write(file("G02-001"), text.replacen("\"done\"", "\"failed\"", 1)).unwrap();
+    let refused = folder.analysis().unwrap_err().to_string();
+    let difference = "outcome is failed in the record and done in the replay";
+    for part in ["G02-001/trial.json is not as", "it has no movements, which earlier versions did not keep", difference] {
+        assert!(refused.contains(part), "no {part:?} in {refused}");
+    }
+    let found = folder.verify().unwrap().differences;
+    assert!(found.contains(&format!("G02-001: {difference}")), "{found:?}");
+}
+
 /// The session records a trial only after the folder of the trial has got its final name.
 #[test]
 fn a_trial_that_cannot_be_kept_changes_no_session() {

@@ -27,7 +27,8 @@ impl StudyFolder {
     ///
     /// [`StudyError::File`] if a file cannot be read. Files with another content are differences.
     pub fn verify(&self) -> Result<Verified, StudyError> {
-        let trials = self.kept_trials()?;
+        // Records of earlier versions stay as they are here: each trial is replayed below, and every difference is then listed.
+        let trials = self.recorded_trials()?;
         // Replays run in parallel. The collected order is the order of the trials, so the report does not depend on the threads.
         let found: Vec<Vec<String>> = trials.par_iter().map(|trial| self.differences_of(trial)).collect::<Result<_, StudyError>>()?;
         let mut differences: Vec<String> = found.into_iter().flatten().collect();
