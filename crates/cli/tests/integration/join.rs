@@ -153,6 +153,10 @@ fn a_second_join_is_told(key: &str) {
     assert!(second.stderr.contains(&format!("{taken}; waiting")) && !second.stderr.contains("takes part"), "{}", second.stderr);
     // An end before that time is no success either.
     desk.cohaptic(&format!("{line} --for 800ms")).assert_refused(3, &[&format!("{taken}. {way_out}")]);
+    // A script reads the same sentence in a document.
+    let outcome = desk.cohaptic(&format!("{line} --for 800ms --json"));
+    outcome.assert_refused(3, &[&taken]);
+    assert_eq!(parse(&outcome.stdout)["message"], format!("{taken}. {way_out}"), "{}", outcome.stdout);
     // A killed program holds its seat for the silence. The next program waits that long.
     first.kill();
     let outcome = takes_part().end_by("-INT");
@@ -273,10 +277,14 @@ fn a_wrong_key_scene_place_or_kind_is_a_sentence() {
     // A session with a key does not answer a `join` without a key, and the key is among the possible reasons.
     join("--peer left --for 300ms").assert_refused(3, &["nothing from 127.0.0.1:", "it has a key, which --key-file must name here, too"]);
 
-    // A file that is not there has the status of a scene that is not there, and a file without a key is a wrong input.
+    // A file that is not there has the status of a scene that is not there. A file without a key, and a key that others may read, are wrong inputs.
     desk.write("empty.key", "");
     desk.set_mode("empty.key", 0o600);
-    for (file, status, part) in [("gone.key", 3, "cannot read the key file gone.key"), ("empty.key", 2, "empty.key is not a key file")] {
+    desk.set_mode("other.key", 0o644);
+    let open = "other.key can be opened by others than its owner (mode 644); close it with: chmod 600 other.key";
+    for (file, status, part) in
+        [("gone.key", 3, "cannot read the key file gone.key"), ("empty.key", 2, "empty.key is not a key file"), ("other.key", 2, open)]
+    {
         join(&format!("--peer left --key-file {file}")).assert_refused(status, &[part]);
         desk.cohaptic(&format!("live lab.toml --key-file {file} {UNHURRIED}")).assert_refused(status, &[part]);
     }
@@ -289,8 +297,6 @@ fn a_wrong_key_scene_place_or_kind_is_a_sentence() {
     join(&format!("{left} {change}")).assert_refused(2, &["the timeline changes the gains of the coordination"]);
     let away = desk.cohaptic("join 192.0.2.7:7400 lab.toml --peer left --device simulated");
     away.assert_refused(2, &["whoever answers at 192.0.2.7:7400 could pull at the device", "--key-file", "--allow-remote"]);
-    desk.set_mode("other.key", 0o644);
-    join("--peer left --key-file other.key").assert_refused(2, &["other.key can be opened by others", "chmod 600"]);
 
     let report = session.end_by("-INT").stdout;
     for part in [" other-scene", " asked to be left with another scene: ", ", of sim at 127.0.0.1"] {
