@@ -7,7 +7,7 @@ use std::time::Duration;
 use cohaptic_device::{Description, Device, GatedForce, Reading, Stopper};
 use cohaptic_harness::TickRow;
 use cohaptic_harness::live::LiveScene;
-use cohaptic_live::join::{JoinedConfig, JoinedPeer, Unfit};
+use cohaptic_live::join::{JoinedConfig, JoinedPeer};
 use cohaptic_live::{Admission, AdmissionConfig, AdmissionControl, Label, MAX_DATAGRAM, Place, Refusal, Seat, SessionKey};
 use cohaptic_peer::{State, wire};
 use cohaptic_scene::Scene;
@@ -30,16 +30,16 @@ pub(crate) fn config(key: Option<SessionKey>) -> JoinedConfig {
     JoinedConfig { key, scene: 7, label: Label::new("test").unwrap(), stale_after: Duration::from_secs(1) }
 }
 
-fn peer(overrides: &[&str], key: Option<SessionKey>, device: Option<Box<dyn Device>>) -> JoinedPeer {
+pub(crate) fn peer(overrides: &[&str], key: Option<SessionKey>, device: Option<Box<dyn Device>>) -> JoinedPeer {
     JoinedPeer::new(scene(overrides), 0, config(key), device).unwrap()
 }
 
-fn at(micros: u64) -> Instant {
+pub(crate) fn at(micros: u64) -> Instant {
     Instant::from_nanos(micros * 1000)
 }
 
 /// Does what is due until `now`, and returns the datagrams sent.
-fn pass(peer: &mut JoinedPeer, now: Instant, observer: &mut impl FnMut(&TickRow<'_>)) -> Vec<Vec<u8>> {
+pub(crate) fn pass(peer: &mut JoinedPeer, now: Instant, observer: &mut impl FnMut(&TickRow<'_>)) -> Vec<Vec<u8>> {
     let mut sent = Vec::new();
     while peer.poll_timeout() <= now {
         peer.handle_timeout(now.min(peer.poll_timeout().max(Instant::ZERO)), &mut Counting::default(), &mut |_, row| observer(row)).unwrap();
@@ -383,37 +383,43 @@ fn a_reading_counts_along_the_axes_of_the_scene_if_it_is_finite() {
 #[test]
 fn the_pull_of_another_peer_elsewhere_fades_as_in_a_session() {
     let mut left = peer(&["peers.right.kind=udp", "peers.right.silence.fade=100ms"], None, None);
-    // The mean of the other peers is own + w·(0.01 m − own).
-    let weight = |left: &mut JoinedPeer, millis: u64| {
+    // The mean of the other peers is own + w·(p − own), where p is the position held for the other peer.
+    let weight = |left: &mut JoinedPeer, millis: u64, held: f64| {
         let mut weight = f64::NAN;
         pass(left, at(millis * 1000), &mut |row| {
             let own = row.object.position[0];
-            weight = (row.target.position[0] - own) / (0.01 - own);
+            weight = (row.target.position[0] - own) / (held - own);
         });
         weight
     };
-    let sample = |sequence: u64| {
-        let state = State { position: [0.01], velocity: [0.0] };
-        let mut datagram = [0; wire::MAX_LEN];
-        let len = wire::Sample { session: 7, sender: 1, sequence, sent: Instant::ZERO, state }.encode(1, &mut datagram);
-        datagram[..len].to_vec()
+    let sample = |sequence: u64, position: f64| {
+        let state = State { position: [position], velocity: [0.0] };
+        crate::support::encode(&wire::Sample { session: 7, sender: 1, sequence, sent: Instant::ZERO, state })
     };
-    let expect = |left: &mut JoinedPeer, millis: u64, expected: f64| {
-        let found = weight(left, millis);
+    let expect = |left: &mut JoinedPeer, millis: u64, held: f64, expected: f64| {
+        let found = weight(left, millis, held);
         assert!((found - expected).abs() < 1e-9, "{found} in place of {expected} at {millis} ms");
     };
-    expect(&mut left, 100, 0.0);
-    left.handle_datagram(at(100_500), &sample(0));
-    expect(&mut left, 101, 0.0);
-    expect(&mut left, 126, 0.25);
+    expect(&mut left, 100, 0.01, 0.0);
+    left.handle_datagram(at(100_500), &sample(0, 0.01));
+    expect(&mut left, 101, 0.01, 0.0);
+    expect(&mut left, 126, 0.01, 0.25);
     for number in 1..100 {
-        left.handle_datagram(at(126_000 + 8000 * number), &sample(number));
+        left.handle_datagram(at(126_500 + 8000 * number), &sample(number, 0.01));
     }
-    expect(&mut left, 930, 1.0);
-    // The last sample came at 918 ms.
-    expect(&mut left, 1918, 1.0);
-    expect(&mut left, 1968, 0.5);
-    expect(&mut left, 2030, 0.0);
+    expect(&mut left, 930, 0.01, 1.0);
+    // The last sample came at 918.5 ms. The pull falls from a second after that arrival on, which is between two ticks.
+    expect(&mut left, 1918, 0.01, 1.0);
+    expect(&mut left, 1919, 0.01, 0.995);
+    expect(&mut left, 1968, 0.01, 0.505);
+    // The other peer is back at another position before its pull has fallen to zero. The pull rises from 0.495, and the held position goes the way from the
+    // position before to the new position over the fade.
+    left.handle_datagram(at(1_968_500), &sample(0, 0.03));
+    expect(&mut left, 1969, 0.01, 0.495);
+    expect(&mut left, 1994, 0.015, 0.745);
+    expect(&mut left, 2069, 0.03, 1.0);
+    expect(&mut left, 3018, 0.03, 0.505);
+    expect(&mut left, 3069, 0.03, 0.0);
 }
 
 /// Two programs ask for the same seat, with a key and without. The second one learns of the first one, and gives up after a time in which a vanished program
@@ -479,35 +485,5 @@ fn a_peer_without_a_seat_learns_so_and_waits_for_a_vanished_holder() {
             // The last sample of the first program came before 1 s, so that its seat is free before 2 s, and a sample needs 24.5 ms.
             assert!(takes_part.is_some_and(|millis| (1990..2040).contains(&millis)) && gives_up.is_none(), "{takes_part:?}, {gives_up:?}");
         }
-    }
-}
-
-#[test]
-fn a_welcome_that_does_not_fit_names_what_differs() {
-    let seats = vec![Seat { place: Place(0), name: "left".to_owned(), tick: Duration::from_millis(2) }];
-    let other = AdmissionConfig::new(7, 3, 4, Duration::from_millis(10), seats).with_key(Some(key()));
-    let mut door = AdmissionControl::new(other, &mut Counting::default()).unwrap();
-    let mut left = peer(&[], Some(key()), None);
-    for hello in pass(&mut left, at(0), &mut |_| ()) {
-        let Admission::Reply { bytes, .. } = door.handle_datagram(at(0), address(1), &hello) else { panic!("no welcome") };
-        left.handle_datagram(at(0), &bytes);
-    }
-    assert_eq!(
-        left.mismatch().unwrap().to_string(),
-        "the session is another one: it has 4 peers, this scene 2; it has 3 axes, this scene 1; its tick for this peer is 2ms, here 1ms; \
-         its coordination.update is 10ms, here 8ms"
-    );
-}
-
-#[test]
-fn scenes_that_need_one_clock_or_one_place_are_refused_by_name() {
-    let refuse = |overrides: &[&str]| JoinedPeer::new(scene(overrides), 0, config(None), None).unwrap_err();
-    assert_eq!(refuse(&["coordination.strategy=extrapolated"]), Unfit::Extrapolated);
-    let timeline = |change: &str| format!("timeline=[{{ at = \"1s\", {change} }}]");
-    assert!(matches!(refuse(&[&timeline("coordination = { stiffness = 100.0 }")]), Unfit::Timeline(_)));
-    assert!(matches!(refuse(&[&timeline("peer = \"left\", set = { hand = { force = 1.0 } }")]), Unfit::Timeline(_)));
-    // Another peer's hand and links are the session's.
-    for change in ["peer = \"right\", set = { hand = { force = 1.0 } }", "link = \"all\", set = { loss = 0.5 }"] {
-        JoinedPeer::new(scene(&[&timeline(change)]), 0, config(None), None).unwrap();
     }
 }

@@ -14,6 +14,9 @@ mod hostile;
 #[cfg(feature = "inverse3")]
 mod inverse3s;
 mod join;
+mod join_engine;
+mod join_fitness;
+mod join_force;
 mod join_sockets;
 mod key_files;
 mod keyed;
