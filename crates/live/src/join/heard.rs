@@ -86,4 +86,27 @@ mod tests {
         heard.take(at(21), 2, at(1));
         assert_eq!(heard.lost(), 3);
     }
+
+    /// Passes samples of 8 ms for 25 s to `heard`. The own clock shows `began` \[ns\] when the sender's clock shows 0, and runs faster by `ppm`.
+    fn listen(heard: &mut HeardSender, began: u64, ppm: i64) {
+        for number in 0..3125 {
+            let sent = number * 8_000_000;
+            let gained = i64::try_from(sent / 1_000_000).unwrap() * ppm;
+            heard.take(Instant::from_nanos((began + sent).checked_add_signed(gained).unwrap()), number, Instant::from_nanos(sent));
+        }
+    }
+
+    #[test]
+    fn the_drift_of_a_sender_is_found_and_counts_anew_after_a_restart_of_the_session() {
+        let mut heard = HeardSender::default();
+        let expect = |heard: &HeardSender, ppm: f64| {
+            let found = heard.drift.ppm().unwrap();
+            assert!((found - ppm).abs() < 0.01, "{found} in place of {ppm}");
+        };
+        listen(&mut heard, 1_000_000_000, 50);
+        expect(&heard, 50.0);
+        // The session began anew, at another offset between the clocks and with another clock.
+        listen(&mut heard, 40_000_000_000, -30);
+        expect(&heard, -30.0);
+    }
 }
