@@ -376,3 +376,6 @@ impl Device for Timed {
         self.device.stop();
     }
 }
+
+#[cfg(test)]
+mod tests;
