@@ -180,8 +180,13 @@ fn a_late_reply_is_not_taken_for_the_reply_to_the_zero() {
     client.receive(at(219), &reply(&["04C3"], CENTRED));
     assert_eq!(client.snapshot(at(219)).reading.unwrap().1, due);
     // The force that waited for the reply goes out with it.
-    assert_eq!(request(&mut client, at(219), Format::V35).force, Some([0.5, 0.0, 0.0]));
+    let next = request(&mut client, at(219), Format::V35);
+    assert_eq!((next.force, next.full), (Some([0.5, 0.0, 0.0]), false));
     assert_eq!((client.report().older, client.report().unasked), (1, 1));
+    // The doubt is over: zero follows after the age of a reading again, and a plain reply counts.
+    assert_eq!(client.poll_timeout(), Some(at(229) + Duration::from_nanos(1)));
+    client.receive(at(220), &reply(&["04C3"], ""));
+    assert_eq!(client.snapshot(at(220)).reading.unwrap().1, at(219));
 }
 
 /// After 100 ms without the reply to a zero, no reply is waited for any more, and the next one counts whatever its form.
