@@ -1,21 +1,21 @@
-//! The check that a symmetric matrix is positive definite whatever its errors are: every certificate of this project ends with it.
+//! Check that a symmetric matrix with errors is positive definite. Every certificate of this project ends with this check.
 //!
-//! After Rump 2006, "Verification of positive definiteness": if the Cholesky factorisation of a symmetric matrix B runs to its end in floating point, then
-//! B + D >= 0 for some symmetric D with ‖D‖₂ <= γ₍ₙ₊₁₎/(1 − γ₍ₙ₊₁₎)·tr B, in whatever order its sums are added. So if it does for B = M − cI, computed, with c
-//! above that bound, above the error of M itself and above the rounding of the subtraction, then M > 0. A symmetric error has no larger 2-norm than its largest
-//! sum of absolute values of a row. M is first scaled by powers of two, which is exact, so that its diagonal is near 1 and c is fair to quantities of very
-//! different size.
+//! The check follows Rump 2006, "Verification of positive definiteness". If the Cholesky factorisation of a symmetric matrix B runs to its end in floating
+//! point, then B + D >= 0 for some symmetric D with ‖D‖₂ <= γ₍ₙ₊₁₎/(1 − γ₍ₙ₊₁₎)·tr B, for any order of the sums. The check factorises B = M − cI, as computed.
+//! Here c exceeds the sum of three errors: the bound above, the error of M, and the rounding of the subtraction. If the factorisation runs to its end, then
+//! M > 0. The 2-norm of a symmetric error is at most the largest sum of absolute values of a row. M is first scaled by powers of two, which is exact. The
+//! diagonal of M is then near 1, and one c suits quantities of very different size.
 
 use crate::Matrix;
 use crate::factorisation::cholesky;
 use crate::rounding::{UNDERFLOW, UNIT, gamma, outward, real};
 
-/// Tells whether every symmetric matrix that differs from `symmetric` by at most `error`, entry by entry, is positive definite. `false` may also mean that
+/// Returns whether every symmetric matrix that differs from `symmetric` by at most `error`, entry by entry, is positive definite. `false` may also mean that
 /// the check could not decide.
 pub fn is_positive(symmetric: &Matrix, error: &Matrix) -> bool {
     let size = symmetric.rows();
     let diagonal: Vec<f64> = (0..size).map(|place| symmetric[(place, place)]).collect();
-    // Written so that NaN fails.
+    // The comparisons are written so that NaN fails the check.
     if !(diagonal.iter().all(|entry| *entry > 0.0 && entry.is_finite()) && error.is_finite()) {
         return false;
     }

@@ -1,12 +1,12 @@
-//! The question that a verdict answers: one place words it, so that no answer calls a verdict by another name.
+//! Question that a verdict answers, in words. The words are in this module alone, so that all answers call a verdict by the same name.
 
 /// Radius by which the scenes of a family are judged. All scenes of a family have the same criterion, so that their radii can be compared in one map.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Criterion {
-    /// The spectral radius over a frame, of scenes that leave nothing to chance.
+    /// The spectral radius over a frame, for scenes without random links.
     SpectralRadius,
-    /// The radius of the second moment over a frame: see [`mean_square`](crate::mean_square()). Chosen where any scene of the family leaves something to
-    /// chance. A scene that leaves nothing to chance has the square of its spectral radius, which is the same number.
+    /// The radius of the second moment over a frame: see [`mean_square`](crate::mean_square()). Chosen if any scene of the family has random links. For a scene
+    /// without random links this radius is the square of the spectral radius.
     MeanSquare,
 }
 
@@ -20,7 +20,7 @@ impl Criterion {
         }
     }
 
-    /// Returns the question that a verdict by this criterion answers, which is another one where the radius is nominal.
+    /// Returns the question that a verdict by this criterion answers: [`VerdictKind::Nominal`] if the radius is nominal.
     #[must_use]
     pub const fn kind(self, is_nominal: bool) -> VerdictKind {
         match (self, is_nominal) {
@@ -34,11 +34,11 @@ impl Criterion {
 /// The question that a verdict answers.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum VerdictKind {
-    /// The question is whether every disturbance dies out; links leave nothing to chance.
+    /// The question is whether every disturbance dies out; links are not random.
     Certain,
-    /// The question is whether the variance of every disturbance dies out; links leave something to chance.
+    /// The question is whether the variance of every disturbance dies out; links are random.
     MeanSquare,
-    /// The question is whether every disturbance would die out if the links left nothing to chance. The links do leave something to it.
+    /// The question is whether every disturbance would die out if the links were not random. The links of the scene are random.
     Nominal,
 }
 
@@ -66,7 +66,7 @@ impl VerdictKind {
         }
     }
 
-    /// Returns how things of this kind were judged, after the word "judged".
+    /// Returns the words for the judgement of scenes of this kind, to follow the word "judged".
     #[must_use]
     pub const fn manner(self) -> &'static str {
         match self {
@@ -76,7 +76,7 @@ impl VerdictKind {
         }
     }
 
-    /// Returns the name of the radius that decides: a nominal radius among mean-square radii is the square of the nominal spectral radius.
+    /// Returns the name of the deciding radius. Beside mean-square radii, a nominal radius is given as the square of the nominal spectral radius.
     #[must_use]
     pub const fn radius_name(self) -> &'static str {
         match self {
@@ -92,7 +92,7 @@ impl VerdictKind {
 pub struct Kinds([usize; 3]);
 
 impl Kinds {
-    /// Counts things that a criterion judges, each of which may be nominal.
+    /// Counts the scenes judged by a criterion. Each scene may be nominal.
     #[must_use]
     pub fn of(criterion: Criterion, nominal: impl IntoIterator<Item = bool>) -> Self {
         Self::count(nominal.into_iter().map(|is_nominal| criterion.kind(is_nominal)))
@@ -111,20 +111,20 @@ impl Kinds {
         VerdictKind::ALL.into_iter().map(move |kind| (kind, self.0[kind as usize])).filter(|(_, count)| *count > 0)
     }
 
-    /// Returns the only kind; `None` of several kinds, or of nothing.
+    /// Returns the only kind present; `None` if there are several kinds or none.
     #[must_use]
     pub fn only(self) -> Option<VerdictKind> {
         let mut present = self.present();
         present.next().filter(|_| present.next().is_none()).map(|(kind, _)| kind)
     }
 
-    /// Returns a verdict on things of these kinds, as a legend says it: `stable in the mean square, nominally stable where hatched`.
+    /// Returns a verdict on scenes of these kinds for a legend: `stable in the mean square, nominally stable where hatched`.
     #[must_use]
     pub fn says(self, verdict: &str) -> String {
         self.joined(|kind| kind.says(verdict))
     }
 
-    /// Returns the names of the radii of these kinds, as a title says them: `mean-square radius, nominal radius squared where hatched`.
+    /// Returns the names of the radii of these kinds for a title: `mean-square radius, nominal radius squared where hatched`.
     #[must_use]
     pub fn radius_name(self) -> String {
         self.joined(|kind| kind.radius_name().to_owned())
@@ -140,7 +140,7 @@ impl Kinds {
     }
 }
 
-/// Returns the head of every nominal verdict: `nominal (jitter and random loss left out)`.
+/// Returns the words at the head of every nominal verdict: `nominal (jitter and random loss left out)`.
 #[must_use]
 pub fn nominal_head(left_out: &[&str]) -> String {
     let list = match left_out {

@@ -1,14 +1,14 @@
 //! Waves that bounce to and fro between copies and move nothing.
 //!
-//! Three copies or more can get waves whose forces add up to nothing: (1, −1) at the first, (1, −1) at the second, (1, −1) at the third, around and around.
-//! Such a motion of the waves lasts forever over links that lose nothing, no body feels it, and from waves at zero none arises. So it is no part of how
-//! the scene moves, and its eigenvalues, of modulus 1, say nothing of stability. The analysis keeps the largest quotient in which every state is felt.
+//! Three copies or more can get waves whose forces add up to zero: (1, −1) at the first copy, (1, −1) at the second, (1, −1) at the third, again and again.
+//! Such waves last forever over links that lose nothing. No body feels such waves, and they never arise from waves at zero. So they are no part of the motion
+//! of the scene, and their eigenvalues, of modulus 1, say nothing about stability. The analysis keeps the largest quotient in which every state is felt.
 
 use crate::factorisation::orthogonal_complement;
 use crate::{Matrix, StateKind, StateName};
 
-/// A row whose part apart from other rows is shorter than this, relative to the largest entry, counts as spanned by them: far above rounding, and far below the
-/// share of one tick in a wave. The error covers such parts.
+/// Length, relative to the largest entry, below which the part of a row orthogonal to other rows counts as zero: the row is then spanned by the other rows. The
+/// length is far above rounding, and far below the share of one tick in a wave. The returned error covers such parts.
 const NOTHING: f64 = 1e-9;
 
 /// Returns the part of a matrix in which a body feels every state, and the error that the reduction adds to the entries. `forces` has the contribution of each
@@ -45,8 +45,8 @@ pub(crate) fn felt(matrix: &Matrix, forces: &Matrix, states: &[StateName]) -> (M
     }
 }
 
-/// Tells whether bodies feel a state only through later forces of strategies: memory and samples, not positions, velocities, pending forces, exchanges with
-/// devices or what an operator remembers.
+/// Returns whether bodies feel a state only through later forces of strategies. Memory and samples are such states. Positions, velocities, pending forces,
+/// exchanges with devices and the memory of an operator are not.
 const fn is_hidden(kind: StateKind) -> bool {
     match kind {
         StateKind::DevicePosition { .. }

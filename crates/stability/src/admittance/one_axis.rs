@@ -66,7 +66,7 @@ impl OneAxis {
         Harmonic::new(&lifted, *pushed, hz).point()
     }
 
-    /// Reduces the system to the device of the pushed peer. The node keeps a copy of the object, as every node has one; without a coupling the copy rests.
+    /// Reduces the system to the device of the pushed peer. Every node has a copy of the object, so the node keeps its copy; without a coupling the copy rests.
     fn leave_bare(&mut self, device: Option<Body>, clock: NodeClock, tied: bool) -> Result<(), AnalysisError> {
         let none = Gains { stiffness: 0.0, damping: 0.0 };
         let bare = self.nodes[self.pushed].clone();
@@ -81,7 +81,7 @@ impl OneAxis {
     }
 }
 
-/// Note for a scene with a timeline: the scene is analysed as it is before the first change.
+/// Note for a scene with a timeline: the analysis takes the scene before the first change.
 pub(super) const TIMELINE: &str = "the timeline is left out: the scene is analysed as it begins";
 
 /// Returns contacts in which every one-sided contact along `axis` is closed and no copy is at a wall, and notes that tell the user about each change.

@@ -1,4 +1,4 @@
-//! The numbers of a scene on which the motion depends, with reading and writing of each number, and the search for the numbers that a key sets.
+//! Numbers of a scene on which the motion depends: reading and writing of each number, and the search for the numbers that a key sets.
 
 use cohaptic_peer::Hand;
 use cohaptic_scene::{PeerSpec, Scene};
@@ -12,7 +12,7 @@ pub(super) enum Leaf {
     WallDamping,
     CoordinationStiffness,
     CoordinationDamping,
-    /// A number of one peer. The index is that of [`Scene::peers`].
+    /// A number of one peer, with the index of the peer in [`Scene::peers`].
     Peer(usize, PeerLeaf),
 }
 
@@ -91,8 +91,8 @@ pub(super) fn learn(probes: &mut [Probe]) -> Option<Vec<Vec<Leaf>>> {
     let of_peers = (0..peers).flat_map(|place| PeerLeaf::ALL.map(|leaf| Leaf::Peer(place, leaf)));
     for leaf in whole.into_iter().chain(of_peers) {
         for (key, leaves) in learned.iter_mut().enumerate() {
-            // A number belongs to a key if it equals the key's value in every probe. Adding 0.0 turns −0.0 into 0.0, which is how the value was printed
-            // for the scene's reader.
+            // A number belongs to a key if the number equals the value of the key in every probe. Adding 0.0 turns −0.0 into 0.0, the form in which the
+            // value was printed for the reader of the scene.
             let holds = |probe: &mut Probe| {
                 let value = probe.values[key] + 0.0;
                 leaf.of(&mut probe.scene).is_some_and(|number| number.to_bits() == value.to_bits())

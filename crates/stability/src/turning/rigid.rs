@@ -73,7 +73,7 @@ pub(super) fn unmoved(turning: &Turning<'_>, candidates: Vec<Vec<([f64; 6], Vec<
         reached.iter().zip(&from).map(|(reached, from)| reached - from).collect::<Vec<f64>>()
     };
     let mut images: Vec<Vec<f64>> = candidates.iter().map(image).collect();
-    // Gaussian elimination by columns, the largest entry first. The combinations that remain are those whose image under a frame is themselves.
+    // Gaussian elimination by columns, the largest entry first. A frame maps each of the remaining combinations to itself.
     loop {
         let entries =
             images.iter().enumerate().flat_map(|(column, image)| image.iter().enumerate().map(move |(row, entry)| (column, row, entry.abs())));
@@ -89,7 +89,7 @@ pub(super) fn unmoved(turning: &Turning<'_>, candidates: Vec<Vec<([f64; 6], Vec<
             image.iter_mut().zip(&moved).for_each(|(entry, moved)| *entry -= factor * moved);
         }
     }
-    // The reference of each displacement is the component of the first copy that it moves most, so that the division by that component is safe.
+    // The reference of a displacement is the component of the first copy that the displacement moves most. Division by this component is safe.
     for place in 0..candidates.len() {
         let reference = (0..6).max_by(|a, b| candidates[place].first(*a).abs().total_cmp(&candidates[place].first(*b).abs())).unwrap_or(0);
         let zero = Displacement { nodes: candidates[place].nodes.iter().map(|(_, device)| ([0.0; 6], vec![0.0; device.len()])).collect(), reference };
