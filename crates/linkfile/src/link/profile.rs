@@ -31,27 +31,28 @@ pub(super) fn resolve(node: &Node, context: Context<'_>) -> Option<Option<Resolv
         }
     };
     if let Some((whole_place, whole)) = table.0.iter().enumerate().rfind(|(_, entry)| says_everything(entry)) {
-        // Within one table no order is meant, so that neither of two whole descriptions is laid over the other.
+        // The keys of one table have no order, so neither of two whole descriptions in one table is laid over the other.
         if written_together(whole, entry) {
             let message = format!("profile and {} exclude each other: expected only one of them, or {} = \"none\"", whole.name, whole.name);
             context.fault(entry.key, &entry.node.path, message);
             return None;
         }
-        // A whole description that is laid over the profile takes the profile away, as it takes all other keys.
+        // A whole description that is laid over the profile replaces the profile, together with all other keys.
         if whole_place > place {
             return Some(None);
         }
     }
     let title = profile.title();
     context.note_profile(if profile.is_symmetric() { title } else { format!("{title}/{}", direction.word()) });
-    // Entries stand in the order of laying over. What stands before the profile in another table lies below the profile, which says everything about its link.
+    // Later entries are laid over earlier entries. An entry of another table before the profile is below the profile, and has no effect: a profile describes
+    // the whole link.
     let is_over = |(index, other): (usize, &&Entry)| index != place && (index > place || written_together(other, entry));
     let over: Vec<Entry> = table.0.iter().enumerate().filter(|(index, other)| is_over((*index, other))).map(|(_, other)| other.clone()).collect();
-    // A key of the user holds at any time. In a state of the profile the same key would win, because keys of states are laid over those of the link.
+    // A key of the user holds in every state. The same key is removed from the states of the profile, because keys of states are laid over keys of the link.
     let own: Vec<&str> = over.iter().map(|entry| entry.name.as_str()).collect();
     let below = without_in_states(&at(&profile.line(direction).keys, entry.node.place, &node.path), &own);
     let over = Node { value: Value::Table(Table(over.clone())), place: node.place, path: node.path.clone() };
-    // The modulators of the file stay known, for a `modulated` that is laid over the profile.
+    // A `modulated` that is laid over the profile names modulators of the file, so these stay known.
     let mut modulators = context.modulators.map_or_else(Modulators::new, |modulators| modulators.as_ref().clone());
     if over.as_table().is_none_or(|table| table.get("modulated").is_none()) {
         modulators.extend(profile.modulators.iter().map(|(name, modulator)| (name.clone(), modulator.clone())));

@@ -73,7 +73,7 @@ pub struct Slice {
 }
 
 impl StreamConfig {
-    /// Bytes that may wait in front of the line by default, beside the bytes on their way.
+    /// Bytes that may wait before the line by default, in addition to the bytes on their way.
     pub const WAITING: u64 = 65_536;
     /// Bytes of one connection held by default without a rate: the largest receive window of Linux up to 6.17 (`tcp_rmem`), 6 MiB.
     pub const WITHOUT_RATE: u64 = 6 << 20;
@@ -144,7 +144,7 @@ impl fmt::Display for Refused {
 
 /// Returns the first part of a link that a stream cannot have.
 fn refused(config: &LinkConfig) -> Option<Refused> {
-    // Every field is named, so that a new stage of links is a decision here too.
+    // Every field is named, so that the compiler asks for a decision here about each new stage of links.
     let LinkConfig {
         mtu,
         outages,

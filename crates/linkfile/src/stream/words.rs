@@ -76,7 +76,7 @@ fn is_fault(word: &str) -> bool {
 
 /// Returns the value of a fault as TOML. `next` is the word after the values and the share, for messages.
 fn value_of(word: &str, values: &[&str], share: Option<&str>, next: Option<&str>) -> Result<String, String> {
-    // Names of the values, sizes and times apart: both have units, so that their order does not matter.
+    // Names of the values that are sizes, and names of the values that are times. Units tell sizes from times, so a size and a time can be in any order.
     let (sizes, times): (&[&str], &[&str]) = match word {
         "stall" => (&[], &["after", "length"]),
         "slice" => (&["size", "variation"], &["gap"]),

@@ -44,7 +44,7 @@ static REASON: Table = Table::of(&[&[
 static BETWEEN: Table = Table::of(&[&of_directions(Form::Table(&RANGES))]);
 static RANGES: Table = Table::with_others(&[], &Form::Pair(&Form::Text));
 
-/// Returns the keys of a table with something for both directions, and something for each.
+/// Returns the keys of a table with entries for both directions together, and for each direction alone.
 const fn of_directions(form: Form) -> [Key; 3] {
     [optional("both", form, "Of both directions"), optional("down", form, "Towards the user"), optional("up", form, "Away from the user")]
 }
@@ -71,7 +71,7 @@ fn read_profile(node: &Node, context: Context<'_>) -> Option<Profile> {
     let modulators = owned(&name, version, &*read_modulators(chains, context)?);
     let [because, between] = ["because", "between"].map(|key| table.get(key));
     let line = |keys: &Node, direction: Direction| {
-        // A fault in a key is found here, and not by whoever names the profile first.
+        // A fault in a key is found here, and not later by the first file that names the profile.
         read_link(keys, context.with_modulators(Some(&modulators)))?;
         let reasons = entries_of(because, direction, |node| read_reason(node, context))?;
         let between = entries_of(between, direction, |node| <[String; 2]>::try_from(texts(node, context)?).ok())?;
@@ -101,7 +101,7 @@ fn read_profile(node: &Node, context: Context<'_>) -> Option<Profile> {
     Some(profile)
 }
 
-/// Returns the modulators under the same names, but with random numbers of the profile's own: another profile may call a modulator alike.
+/// Returns the modulators under the same names, with random numbers of the profile's own: another profile may have a modulator of the same name.
 fn owned(profile: &str, version: u32, modulators: &Modulators) -> Arc<Modulators> {
     let renamed = modulators
         .iter()
@@ -109,10 +109,10 @@ fn owned(profile: &str, version: u32, modulators: &Modulators) -> Arc<Modulators
     Arc::new(renamed.collect())
 }
 
-/// Returns the entries for one direction: those of both directions, and those of the direction in place of them.
+/// Returns the entries for one direction. An entry of the direction replaces the same entry of both directions.
 fn entries_of<T>(table: Option<&Node>, direction: Direction, read: impl Fn(&Node) -> Option<T>) -> Option<BTreeMap<String, T>> {
     let of = |key: &str| table.and_then(Node::as_table)?.get(key)?.node.as_table();
-    // The later entry of a key replaces the earlier one in the map.
+    // The map keeps the last entry of a key.
     let entries = [of("both"), of(direction.word())].into_iter().flatten().flat_map(|table| &table.0);
     entries.map(|entry| Some((entry.name.clone(), read(&entry.node)?))).collect()
 }
