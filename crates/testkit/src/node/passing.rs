@@ -44,7 +44,7 @@ impl NodeRun {
 
     /// Asks a node for packets and its deadline. `because` is the cause of the question, for the message of a run that does not end.
     pub(super) fn ask(&mut self, id: NodeId, because: Does) {
-        // The node leaves its place while its methods run, so that `send` can borrow the run.
+        // The node is taken out of the list while its methods run, so that `send` can borrow the run.
         let Some(mut node) = self.nodes[id.index()].take() else { return self.deadlines.set(id.index(), None) };
         let mut sent = 0;
         // The pulse numbers the nodes in their order, from 1.

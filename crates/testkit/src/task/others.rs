@@ -1,4 +1,4 @@
-//! Tasks of tokio that live on hosts. Tokio polls these tasks, and the test bed stops the tasks of a host with the host.
+//! Tasks of tokio that belong to hosts. Tokio polls these tasks, and the test bed stops the tasks of a host together with the host.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -17,7 +17,7 @@ pub(crate) struct OtherTasks {
 impl OtherTasks {
     pub(crate) fn keep(&self, host: NodeId, stop: Box<dyn Stop>) {
         let mut kept = self.stops.lock().unwrap_or_else(PoisonError::into_inner);
-        // Tasks that are over are forgotten whenever the array is full, so that the array stays proportional to the number of live tasks.
+        // Handles of ended tasks are removed whenever the array is full, so the array stays proportional to the number of running tasks.
         if kept.len() == kept.capacity() {
             kept.retain(|(_, stop)| !stop.is_over());
         }
