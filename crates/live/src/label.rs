@@ -5,8 +5,8 @@ use core::fmt;
 /// Length of the longest label \[byte\].
 pub(crate) const LABEL_LEN: usize = 8;
 
-/// Name of the kind of device at a peer elsewhere, such as `falcon`: at most eight printable ASCII characters without a space. The session shows the label and
-/// decides nothing by it.
+/// Name of the kind of device at a peer elsewhere, such as `falcon`: at most eight printable ASCII characters without a space. The session shows the label. No
+/// decision depends on the label.
 #[derive(Clone, Copy, PartialEq, Eq, Default)]
 pub struct Label([u8; LABEL_LEN]);
 
@@ -27,7 +27,7 @@ impl Label {
     pub(crate) fn from_bytes(bytes: [u8; LABEL_LEN]) -> Option<Self> {
         let len = bytes.iter().position(|byte| *byte == 0).unwrap_or(LABEL_LEN);
         let (text, rest) = bytes.split_at(len);
-        // The page and the terminal show the label, so that control characters must not pass.
+        // The page and the terminal show the label, so control characters are refused.
         let sound = text.iter().all(u8::is_ascii_graphic) && rest.iter().all(|byte| *byte == 0);
         sound.then_some(Self(bytes))
     }

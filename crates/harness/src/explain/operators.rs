@@ -1,4 +1,4 @@
-//! Explanation of operators: what each person is taken for.
+//! Explanation of operators: the model of each person.
 
 use cohaptic_peer::Hand;
 use cohaptic_peer::operator::{MovesConfig, OperatorLaw, Seen};
@@ -67,7 +67,7 @@ fn described(scene: &Scene, peer: usize, spec: &PeerSpec) -> Option<(String, &'s
     Some((format!("{law}; {seen}; {arm}"), reason))
 }
 
-/// Returns whether the movements of a person leave anything to chance.
+/// Returns whether the movements of a person of the scene are random.
 pub(super) fn has_noise(scene: &Scene) -> bool {
     let noisy = |law: &OperatorLaw| matches!(law, OperatorLaw::Moves(moves) if moves.noise > 0.0);
     (0..scene.peers.len()).filter_map(|peer| scene.operator(peer)).any(|operator| noisy(&operator.law))

@@ -1,4 +1,4 @@
-//! Whether the seat of a joined peer belongs to another program, as far as the answers of the session tell.
+//! Seat of a joined peer: tells from the answers of the session whether another program has the seat.
 
 use std::time::Duration;
 

@@ -93,7 +93,7 @@ impl Watch {
         self.measures.as_ref().map(|measures| measures.values(elapsed)).unwrap_or_default()
     }
 
-    /// Returns what there is to see of the task at an instant; `None` for a scene without a task.
+    /// Returns the visible state of the task at an instant; `None` for a scene without a task.
     pub(super) fn task_view(&self, at: Instant) -> Option<TaskView> {
         self.measures.as_ref().and_then(|measures| measures.task_view(at))
     }

@@ -66,8 +66,8 @@ const CLIENT: NodeId = NodeId(0);
 /// Node of a proxy's network standing for the server.
 const SERVER: NodeId = NodeId(1);
 
-/// Time after which the cross packets that no datagram has met are computed. The loop of the relay comes by at each look, 50 ms apart at most, also in a silence;
-/// so the first datagram after any silence waits for the cross packets of one look at most, 0.1 ms at 10,000 packets a second.
+/// Time after which the cross packets that no datagram has met are computed. The loop of the relay turns at least every 50 ms, also in a silence. So the first
+/// datagram after any silence waits for the cross packets of 50 ms at most, 0.1 ms at 10,000 packets a second.
 const CATCH_UP: Duration = Duration::from_millis(10);
 
 /// Senders and receivers of a topology, by address.

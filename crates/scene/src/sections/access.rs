@@ -33,7 +33,7 @@ pub(super) struct Access {
 pub(super) fn read_access(table: &mut TableReader<'_>, context: Context<'_>) -> Option<Access> {
     let named = table.entry("access").map(|entry| read_name(entry, context));
     let line = |table: &mut TableReader<'_>, key: &'static str, direction: Direction| {
-        // A refused name leaves the other keys to be read alone, so that their faults are found too.
+        // After a refused name the other keys are read without a link below them, so that their faults are found too.
         let below = named.as_ref().and_then(|named| named.as_ref()?.as_ref()).map(|(entry, name)| profile_of(entry, name, key, direction));
         let node = match (table.get(key), below) {
             (Some(own), Some(below)) => Cow::Owned(own.over(&below, &[])),
@@ -71,7 +71,7 @@ fn read_name<'a>(entry: &'a Entry, context: Context<'_>) -> Option<Option<(&'a E
 /// Returns the keys of one access line from the library: the key `profile` alone, at the place where the user wrote `access`.
 fn profile_of(access: &Entry, name: &str, key: &str, direction: Direction) -> Node {
     let place = access.node.place;
-    // The parent of the path differs from that of the keys under `uplink`, which are therefore laid over the profile.
+    // The path has another parent than the paths of the keys under `uplink`. Keys of another table are laid over the profile, so the keys of `uplink` are.
     let path = access.node.path.clone();
     let profile = Node { value: Value::Text(format!("{name}/{}", direction.word())), place, path: join(&path, "profile") };
     let entry = Entry { name: "profile".to_owned(), key: access.key, node: Arc::new(profile) };

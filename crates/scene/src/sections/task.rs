@@ -79,7 +79,7 @@ const WHO: Choices<Judged, 2> = [
     ("all", Judged::All, "all peers whose devices touch the object, together"),
     ("any", Judged::Any, "the same peers, each alone: the first one that is done ends the task"),
 ];
-/// Keys of some kinds of tasks only, each with the kinds.
+/// Keys that only some kinds of tasks have, each with these kinds and with their names for messages.
 const OF_KINDS: [(&str, &[Kind], &str); 16] = [
     ("targets", REACHING, "reach or carry"),
     ("order", REACHING, "reach or carry"),

@@ -24,11 +24,11 @@ pub(crate) struct Group {
 pub(crate) enum GroupState {
     /// The session is under way, complete or abandoned.
     Session(Box<Sequence>),
-    /// A person of the group was forgotten: the trials, which nobody moved alone, are gone, and so are the answers of this person.
+    /// The data of a person of the group were removed: the trials, in which all people of the group moved together, and the answers of this person.
     Forgotten {
-        /// Forgotten persons.
+        /// Persons whose data were removed.
         persons: Vec<PersonCode>,
-        /// Answers of the others.
+        /// Answers of the other persons of the group.
         answers: Vec<GivenAnswer>,
     },
 }
@@ -131,11 +131,12 @@ impl Group {
 }
 
 fn line(of: &impl Serialize) -> String {
-    // Structures of numbers and words, without maps whose keys are no text.
+    // Serialisation cannot fail: the structures hold numbers and words, and no map with keys other than texts.
     serde_json::to_string(of).expect("a line of a session is written") + "\n"
 }
 
-/// Returns whether an answer is one to a question of the study. The session of a forgotten person has no events, by which its answers would be checked.
+/// Returns whether an answer fits a question of the study. Answers are checked here if the data of a person were removed: the session then has no events, which
+/// otherwise check the answers.
 fn is_of(study: &Study, answer: &GivenAnswer) -> bool {
     let question = study.questions.get(answer.question);
     let has_values = |question: &Question| answer.values.len() == question.values() && answer.values.iter().all(|value| question.accepts(*value));

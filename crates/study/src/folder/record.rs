@@ -126,7 +126,7 @@ impl TrialRecord {
             return Ok(self);
         }
         let replayed = Replayed::of(folder)?;
-        // Movements of another replay would not be those of the trial whose measures are in the record.
+        // A replay with other results is the replay of another trial, and so its movements do not belong to this record.
         match self.differences_to(&replayed).first() {
             Some(difference) => {
                 let message = format!("it has no movements, which earlier versions did not keep, and its replay is of another trial: {difference}");

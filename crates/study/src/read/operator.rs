@@ -19,11 +19,13 @@ pub(super) fn read_operator(node: &Node, context: Context<'_>) -> Option<Person>
     Some(Person { movement: movement?, visual_delay: visual_delay?, reaction: reaction?, noise: noise?, crossover: crossover? })
 }
 
-/// Numerator and denominator of 2.5, the factor of the mean that the numbers of hardly any person exceed: e^(0.15·z) with z = 6.1.
+/// Numerator of 2.5. A number of a person is the mean times e^(0.15·z) with a normal z, and exceeds 2.5 times the mean only if z > 6.1, once in 10⁹ persons.
 const MOST: u32 = 5;
+/// Denominator of 2.5.
 const OVER: u32 = 2;
 
-/// Reports the first key of a table `[operator]` around whose mean a person could have a number that a scene refuses. Returns whether there is no such key.
+/// Reports the first key of a table `[operator]` with a mean so near a limit that a scene could refuse the number of a person. Returns whether there is no such
+/// key.
 pub(super) fn fits(study: &Study, operator: &Node, context: Context<'_>) -> bool {
     let Person { movement, visual_delay, reaction, noise, crossover } = study.operator;
     let (factor, times) = (f64::from(MOST) / f64::from(OVER), |duration: Duration| duration * MOST / OVER);
