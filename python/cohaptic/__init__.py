@@ -1,4 +1,4 @@
-"""Several people who feel and move one virtual object together over a bad network.
+"""Emulation and analysis of people who feel and move one virtual object together over a bad network.
 
 A scene is read from a file or a text, run in virtual time, and analysed:
 

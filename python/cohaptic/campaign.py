@@ -22,20 +22,20 @@ _Work = Callable[[int, int], _Cells]
 _Plan = tuple[str, str, list[str], list[str], int, str | None, str]
 
 Vary = Mapping[str, Sequence[Any]] | Iterable[str]
-"""Keys and their values, or texts as for ``--vary``."""
+"""Keys with their values, or texts as for ``--vary``."""
 
 Workers = Executor | Callable[[], Executor] | None
-"""An executor, or what makes one; ``None`` for threads of this process."""
+"""Executor, or function that makes an executor; ``None`` for threads of this process."""
 
 _ASKED = 3
-"""How often the same runs are asked for before their worker's exception is raised."""
+"""Number of times that the same runs are asked for, before the exception of their worker is raised."""
 
 _PIECES = 64
-"""About how many pieces a campaign is cut into: enough to keep workers busy to the end, and few enough to cost nothing."""
+"""Approximate number of pieces of a campaign: enough to keep workers busy to the end, and so few that their overhead is small."""
 
 
 class Runs(Table):
-    """A table with a row a run, and the document of its runs."""
+    """Table with a row per run, and the document of the runs."""
 
     def __init__(self, answer: _native.CampaignAnswer) -> None:
         super().__init__(answer.table)
@@ -43,16 +43,16 @@ class Runs(Table):
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """The document of the command with ``--json``, without the time that the runs took and the files."""
+        """Document of the command with ``--json``, without the wall time of the runs and the files."""
         document: dict[str, Any] = json.loads(self._answer.summary)
         return document
 
 
 class Campaign(Runs):
-    """The table of :func:`campaign`, with the document of ``cohaptic campaign`` as ``summary``."""
+    """Table of :func:`campaign`, with the document of ``cohaptic campaign`` as ``summary``."""
 
     def plot(self, name: str = "discrepancy") -> Picture:
-        """The program's own picture: ``discrepancy``, or ``verdicts`` where combinations were judged."""
+        """Returns a picture of ``cohaptic campaign``: ``discrepancy``, or ``verdicts`` if combinations were judged."""
         return Picture(self._answer.picture(name))
 
 
@@ -65,16 +65,17 @@ def campaign(
     executor: Workers = None,
     piece: int | None = None,
 ) -> Campaign:
-    """Runs a scene over values of keys and over seeds, and gives one row a run: the rows of ``cohaptic campaign`` for the same keys.
+    """Runs a scene over values of keys and over seeds. Returns a row per run: the rows of ``cohaptic campaign`` for the same keys.
 
     ``vary`` maps keys to their values, or has texts as for ``--vary``, such as ``"coordination.stiffness=500..1500/3"``. Every combination is run with
-    ``runs`` seeds, which count up from that of the scene. The column of a key has the name of the key, and :meth:`Table.unit` its unit, where the
-    program's table has both in one name: ``link.delay_ms``. With ``verdicts`` each combination is judged as :meth:`Scene.stability` judges it, and each
-    row has the verdict of its combination.
+    ``runs`` seeds, which count up from the seed of the scene. The column of a key has the name of the key, and :meth:`Table.unit` returns its unit. (The
+    table of the program has both in one name, such as ``link.delay_ms``.) With ``verdicts`` each combination is judged like :meth:`Scene.stability`, and
+    each row has the verdict of its combination.
 
-    ``executor`` is any ``concurrent.futures.Executor``, whose workers have this package, or a callable that makes one; without it threads of this
-    process are taken. ``piece`` runs are asked for at a time. Runs that a worker lost are asked for again, up to three times. An executor that broke is
-    made anew if it came from a callable; otherwise its runs are made in this process. Which worker made a run changes nothing in its row.
+    ``executor`` is a ``concurrent.futures.Executor`` whose workers have this package, or a callable that makes an executor. By default threads of this
+    process do the runs. ``piece`` is the number of runs in one call of a worker. Runs that a worker lost are asked for again, up to three times. If the
+    executor breaks, a callable makes a new executor; without a callable, this process does the remaining runs. The row of a run does not depend on the
+    worker.
 
     >>> scene = Scene('''
     ... scene = { duration = "100ms", count = 2 }
@@ -121,13 +122,13 @@ def _listed(values: Sequence[Any]) -> str:
 
 
 def _rows(plan: _Plan, start: int, end: int) -> _Cells:
-    """Some rows, in any process."""
+    """Returns the rows of the runs from ``start`` to ``end``. Any process can call this function."""
     text, file, overrides, vary, runs, strategies, roster = plan
     return _native.Campaign(text, file, overrides, vary, runs, 1, strategies, roster).rows(start, end)
 
 
 def _here(whole: _native.Campaign, pieces: list[_Piece]) -> dict[_Piece, _Cells]:
-    """All rows, by threads of this process, which end with it."""
+    """Returns all rows, computed by threads of this process that end with this call."""
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         try:
             return _gathered(whole.rows, pieces, threads, None)
@@ -167,7 +168,7 @@ def _ask(
     rows: dict[_Piece, _Cells],
     asked: dict[_Piece, int],
 ) -> bool:
-    """Asks for pieces and puts what comes to the rows; whether the executor broke meanwhile."""
+    """Asks for pieces, and adds the results to the rows. Returns whether the executor broke meanwhile."""
     futures = {}
     broken = False
     try:

@@ -1,4 +1,4 @@
-"""Strategies side by side, with the same seeds."""
+"""Comparisons of strategies with the same seeds."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from cohaptic.scene import Scene
 
 
 class Comparison(Runs):
-    """The table of :func:`compare`, with the document of ``cohaptic compare`` as ``summary``."""
+    """Table of :func:`compare`, with the document of ``cohaptic compare`` as ``summary``."""
 
 
 def compare(
@@ -21,11 +21,11 @@ def compare(
     executor: Workers = None,
     piece: int | None = None,
 ) -> Comparison:
-    """Sets strategies side by side over values of keys: the figures of ``cohaptic compare`` for the same strategies.
+    """Compares strategies over values of keys. Returns the figures of ``cohaptic compare`` for the same strategies.
 
-    ``strategies`` is a text as for ``--strategies``, or a list of strategies: the others are compared with the first. Parameters stand in braces behind
-    the name: ``"local-damping{damping=58}"``. Every strategy has the same seeds, and all measures. Combinations that a strategy refuses are left out,
-    and the summary says why. The other parameters are those of :func:`campaign`.
+    ``strategies`` is a text as for ``--strategies``, or a list of strategies. All strategies are compared with the first strategy. Parameters are in
+    braces after the name: ``"local-damping{damping=58}"``. Every strategy has the same seeds, and all measures. Combinations that a strategy refuses are
+    left out, and the summary has the reason. All other parameters are parameters of :func:`campaign`.
 
     >>> scene = Scene('''
     ... scene = { duration = "200ms" }

@@ -1,4 +1,4 @@
-"""What is raised: each class is a :class:`CohapticError`, and that is a :class:`ValueError`."""
+"""Exceptions of the package. Each class is a :class:`CohapticError`, which is a :class:`ValueError`."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ class CohapticError(ValueError):
 
 
 class AnalysisError(CohapticError):
-    """A scene has no such analysis."""
+    """The analysis does not cover the scene."""
 
 
 class SceneError(CohapticError):
-    """A scene or a link makes no sense, at a place.
+    """A scene or a link is refused, with the place of the fault.
 
     >>> from cohaptic import Link, SceneError
     >>> try:
@@ -25,17 +25,17 @@ class SceneError(CohapticError):
     """
 
     file: str | None
-    """The file with the fault; ``None`` if it is in an override."""
+    """File with the fault; ``None`` if the fault is in an override."""
     argument: str | None
-    """The ``KEY=VALUE`` with the fault; ``None`` if it is in a file."""
+    """Override ``KEY=VALUE`` with the fault; ``None`` if the fault is in a file."""
     line: int | None
-    """The line, from 1."""
+    """Line of the fault, from 1."""
     column: int | None
-    """The column, from 1, in characters."""
+    """Column of the fault [characters], from 1."""
     key: str | None
-    """The dotted path of the key."""
+    """Dotted path of the key."""
     fault: str | None
-    """The fault and what was expected, in one line; the text of the exception shows the line of the file too."""
+    """Fault and expected form, in one line. The text of the exception also shows the line of the file."""
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class SceneError(CohapticError):
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """For executors, whose workers raise in another process."""
+        """Pickles the exception, because workers of executors raise in another process."""
         place = (self.file, self.argument, self.line, self.column, self.key, self.fault)
         return type(self), (self.args[0], *place)
 

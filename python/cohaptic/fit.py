@@ -1,4 +1,4 @@
-"""Links that are estimated from measurements."""
+"""Estimation of links from measurements."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ def fit(
     cut: bool = False,
     hold_out: float | None = None,
 ) -> dict[str, Any]:
-    """Estimates the link that made measurements, and gives the document of ``cohaptic fit --json``.
+    """Estimates the link behind measurements, and returns the document of ``cohaptic fit --json``.
 
-    Its ``scene`` has the link as keys of a scene, its ``goodness`` says how good the estimate is.
+    In the document, ``scene`` has the link as keys of a scene, and ``goodness`` says how good the estimate is.
 
-    ``source`` is a file with one-way measurements, a file of fates, a file of IRTT, ping, iperf3, LENS, CellReplay or netem-trace, or the capture of the
-    sender, with that of the receiver as ``receiver``, of which only datagrams to the UDP ``port`` count. Or it is a pair of arrays: when each packet was
-    sent, and its delay [s], which is NaN where the packet was lost.
+    ``source`` is one of these: a file with one-way measurements; a file of fates; a file of IRTT, ping, iperf3, LENS, CellReplay or netem-trace; the capture
+    of the sender, with the capture of the receiver as ``receiver``; or a pair of arrays with the instant of sending and the delay of each packet [s]. The
+    delay of a lost packet is NaN. Of captures, only datagrams to the UDP ``port`` count.
 
-    ``offset`` [s] is added to the clock of the receiver, and so to every delay. ``least`` [s] says what the least delay is. ``skew`` removes the linear
-    drift of one clock against the other, where it is significant.
+    ``offset`` [s] is added to the clock of the receiver, and so to every delay. ``least`` [s] is the known least delay. ``skew`` removes the linear drift
+    between the two clocks if the drift is significant.
 
-    ``direction`` is the way of the packets in a file that has both ways, and ``split`` the share of a round trip that is the delay of one way, such as 0.5.
-    ``walk`` lets a measured rate change as a walk through five states, and ``instant_bytes`` leave at each instant of a line (mahimahi: 1504, else 1400).
-    ``tick`` [s] is the tick of the clock that showed the delays, to which it rounds or, with ``cut``, cuts. ``hold_out`` is the
-    share of the time at the end whose packets are not fitted and judge the link, such as 0.5.
+    ``direction`` selects the way of the packets in a file with both ways. ``split`` is the share of a round trip that is the delay of one way, such as
+    0.5. With ``walk`` a measured rate changes as a walk through five states. ``instant_bytes`` is the number of bytes that leave at each instant of a line
+    (1504 for mahimahi, otherwise 1400). ``tick`` [s] is the tick of the clock that measured the delays. Delays are rounded to the tick, or cut to the
+    tick with ``cut``. ``hold_out`` is the share of the time at the end, such as 0.5, whose packets are not fitted but judge the link.
 
     >>> from cohaptic import Link
     >>> sent = np.arange(20_000) * 0.01

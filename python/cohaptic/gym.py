@@ -1,4 +1,4 @@
-"""A ``gymnasium`` environment whose agent is far away: observations and actions travel over links."""
+"""Environments of ``gymnasium`` with a remote agent: observations and actions travel over links."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from cohaptic.link import Link
 
 
 class RemoteEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """An environment behind two links.
+    """Environment at the other end of two links.
 
-    At each step the agent's action is sent to the environment, which takes the newest action that has arrived, and the environment's observation is sent
-    back, where the agent sees the newest one that has arrived. Until the first action is there, ``idle`` is done; until the first observation
-    is there, the one of the reset is seen. ``info`` has ``action_age`` and ``observation_age`` [s].
+    At each step the action of the agent is sent to the environment, and the environment takes the newest action that has arrived. The observation of the
+    environment is sent back, and the agent sees the newest observation that has arrived. Before the first action arrives, the environment takes the action
+    ``idle``. Before the first observation arrives, the agent sees the observation of the reset. ``info`` has ``action_age`` and ``observation_age`` [s].
 
-    Observations and actions are copied when they are sent and when they are handed out: an environment that writes the next observation into the
-    same array, and an agent that changes what it sees, change nothing on the way.
+    Observations and actions are copied when they are sent and when they are handed out. So an environment may write the next observation into the same
+    array, and an agent may change the observation that it sees.
 
-    ``period`` is the time of a step [s]. Links begin anew at each reset. With a seed, their seed is that of the reset, and without one until then
-    ``seed``. A reset without a seed begins another episode, whose links have a seed made from the last seed and the number of episodes since.
+    ``period`` is the time of a step [s]. Links begin anew at each reset. Their seed is the seed of the latest reset with a seed, or ``seed`` before such a
+    reset. A reset without a seed begins another episode. The seed of its links is computed from the last seed and the number of episodes since then.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class RemoteEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._steps = 0
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begins anew; the agent sees the beginning at once."""
+        """Begins a new episode. The agent sees the first observation at once."""
         observation, info = self.env.reset(seed=seed, options=options)
         if seed is None:
             self._episode += 1
@@ -62,7 +62,7 @@ class RemoteEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
         return deepcopy(observation), info
 
     def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
-        """One step of the environment, with what has arrived."""
+        """Does a step of the environment with the newest action that has arrived, and returns the newest observation that has arrived."""
         now = self._steps * self._period
         taken = self._over("action", now, action)
         observation, reward, terminated, truncated, info = self.env.step(taken)
@@ -75,7 +75,7 @@ class RemoteEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
         return seen, reward, terminated, truncated, {**info, **ages}
 
     def _over(self, what: str, now: float, payload: Any) -> Any:
-        """Sends something, and gives the newest of its kind that has arrived."""
+        """Sends an action or an observation, and returns the newest one of the same kind that has arrived."""
         link = self._links[what]
         link.handle_packet(now, self._size, deepcopy(payload))
         for event in link.poll(now):
@@ -85,5 +85,5 @@ class RemoteEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 def _seed_of(seed: int, episode: int) -> int:
-    """The seed of an episode's links: that of the reset itself, and then others that have nothing to do with each other."""
+    """Returns the seed of the links of an episode: the seed of the reset for episode 0, then independent seeds."""
     return seed if episode == 0 else int(np.random.SeedSequence([seed, episode]).generate_state(1, np.uint64)[0])

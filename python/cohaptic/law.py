@@ -1,7 +1,7 @@
 """Coordination laws that are written in Python.
 
-A law is made for each peer, and asked for a force at each of its ticks. A spring and a damper to the mean of the others, which is
-average-position coordination, is
+A law is made for each peer, and is asked for a force at each tick of the peer. Average-position coordination is a spring and a damper to the mean of
+the other peers:
 
 >>> class Spring:
 ...     def __init__(self, peer):
@@ -10,7 +10,7 @@ average-position coordination, is
 ...         to_mean = own.position - held.mean.position
 ...         return self.peer.stiffness * to_mean + self.peer.damping * (own.velocity - held.mean.velocity)
 
-and is run and judged by ``scene.run(law=Spring)`` and ``scene.stability(law=Spring)``.
+``scene.run(law=Spring)`` runs the scene with this law, and ``scene.stability(law=Spring)`` analyses it.
 """
 
 from __future__ import annotations
@@ -25,38 +25,38 @@ __all__ = ["Held", "Law", "Peer", "State"]
 
 @dataclass(frozen=True)
 class Peer:
-    """Whose law it is."""
+    """The peer that a law is made for."""
 
     name: str
-    """Its name."""
+    """Name of the peer."""
     place: int
-    """Its place in the scene."""
+    """Index of the peer in the scene, from 0."""
     others: int
-    """How many others take part."""
+    """Number of other peers."""
     axes: int
-    """How many axes the scene has."""
+    """Number of axes of the scene, 1 to 3."""
     stiffness: float
-    """The stiffness of the coordination, scaled by the number of peers as the scene says [N/m]."""
+    """Stiffness of the coordination [N/m], scaled by the number of peers as the scene says."""
     damping: float
-    """The damping of the coordination, scaled in the same way [N·s/m]."""
+    """Damping of the coordination [N·s/m], scaled in the same way."""
     tick: float
-    """The time between two ticks [s]."""
+    """Time between two ticks of the peer [s]."""
     update: float
-    """The time between two samples that it sends [s]."""
+    """Time between two samples that the peer sends [s]."""
 
 
 class Law(Protocol):
-    """What a law has. Nothing has to inherit from it.
+    """Methods and attributes of a coordination law. A law need not inherit from this class.
 
-    The answer depends on the calls made so far and on nothing else. All that is remembered from tick to tick stands in an attribute ``memory``, an array
-    or a list of always as many numbers, which the analysis reads and sets; a law without it remembers nothing. A method
-    ``set_gains(stiffness, damping)`` [N/m, N·s/m], if there is one, hears of gains that the timeline changes.
+    The force depends only on the calls made so far. A law keeps everything that it remembers from tick to tick in the attribute ``memory``, an array or
+    a list whose length never changes. The analysis reads and sets this attribute. A law without ``memory`` remembers nothing. If the law has a method
+    ``set_gains(stiffness, damping)`` [N/m, N·s/m], this method is called when the timeline changes the gains.
     """
 
     def command(self, own: State, held: Held, t: float) -> Any:
-        """The force that is subtracted [N], a number for each axis.
+        """Returns the coordination force [N], a number for each axis. The force acts on the copy with the opposite sign.
 
-        ``own`` is the copy of the peer: ``position`` and ``velocity`` are arrays with a number for each axis. ``held`` has the newest samples from the
-        others: their ``mean``, and ``positions`` and ``velocities`` with a row for each. ``t`` is the instant [s].
+        ``own`` is the state of the peer's copy: ``position`` [m] and ``velocity`` [m/s] are arrays with a number for each axis. ``held`` has the newest
+        samples of the other peers: the ``mean`` of the samples, and ``positions`` and ``velocities`` with a row for each peer. ``t`` is the instant [s].
         """
         ...

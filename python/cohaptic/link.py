@@ -12,74 +12,75 @@ import numpy.typing as npt
 from cohaptic import _native
 
 CAUSES: tuple[str, ...] = tuple(_native.causes())
-"""Why a packet was dropped, by its code in :attr:`Sent.cause`; 0 is no cause."""
+"""Names of the causes of a drop, indexed by the codes in :attr:`Sent.cause`. Code 0 means that the packet was delivered."""
 
 ON_THE_WAY = 255
-"""The code of a packet that never comes out of the link."""
+"""Code in :attr:`Sent.cause` of a packet that never comes out of the link."""
 
 
 class Copies(NamedTuple):
-    """The copies that a link made of packets, in the order in which they arrived or were dropped."""
+    """Copies of packets that a link made, in the order in which the copies arrived or were dropped."""
 
     packet: np.ndarray
-    """Of which packet, by its place."""
+    """Index of the packet that was copied, in the order of sending."""
     number: np.ndarray
-    """Which copy, from 1."""
+    """Number of the copy among the copies of its packet, from 1."""
     arrived: np.ndarray
-    """When it arrived [s]; NaN if it was dropped."""
+    """Instant of the arrival [s]; NaN for a dropped copy."""
     cause: np.ndarray
-    """Why it was dropped, as in :attr:`Sent.cause`."""
+    """Code of the cause of the drop, as in :attr:`Sent.cause`."""
 
 
 class Sent(NamedTuple):
-    """What became of packets: an entry for each, in the order in which they were sent."""
+    """Fates of packets. Each array has an entry per packet, in the order of sending."""
 
     arrived: np.ndarray
-    """When it arrived [s]; NaN if it was dropped."""
+    """Instant of the arrival [s]; NaN for a dropped packet."""
     cause: np.ndarray
-    """0 if it arrived, else the place of the cause in :data:`CAUSES`."""
+    """Code of the cause of the drop, an index of :data:`CAUSES`; 0 for a delivered packet."""
     marked: np.ndarray
-    """Whether an active queue marked it."""
+    """``True`` for a packet that an active queue marked (ECN)."""
     damaged: np.ndarray
-    """Whether bits were flipped."""
+    """``True`` for a packet with flipped bits."""
     copies: Copies
-    """The copies that the link made."""
+    """Copies of packets that the link made."""
 
     @property
     def delivered(self) -> np.ndarray:
-        """Whether it arrived."""
+        """``True`` for each delivered packet."""
         return np.asarray(self.cause == 0)
 
 
 class Event(NamedTuple):
-    """What became of one packet, or of one copy of it."""
+    """Fate of a packet, or of a copy of a packet."""
 
     payload: Any
-    """The object that was handed over."""
+    """Object that was given to :meth:`Link.handle_packet`."""
     sequence: int
-    """The number of the packet, from 0."""
+    """Number of the packet, from 0."""
     copy: int
-    """0 for the packet itself; copies count from 1."""
+    """Number of the copy, from 1; 0 for the packet itself."""
     offered: float
-    """When it was offered [s]."""
+    """Instant at which the packet was offered to the link [s]."""
     at: float
-    """When it happened [s]."""
+    """Instant of the fate [s]."""
     fate: str
-    """``delivered``, ``duplicated``, or why it was dropped."""
+    """``delivered``, ``duplicated``, or the cause of the drop."""
     size: int
-    """In bytes."""
+    """Size of the packet [bytes]."""
     marked: bool
-    """Whether an active queue marked it."""
+    """``True`` if an active queue marked the packet (ECN)."""
     damaged: bool
-    """Whether bits were flipped."""
+    """``True`` if bits of the packet were flipped."""
 
 
 class Link:
     """A directed link: delays, losses, queues, order.
 
-    ``spec`` is said in words of ``tc-netem``, or in keys of a scene: ``"delay 20ms 5ms loss 1%"`` or ``"delay=20ms jitter=5ms loss=1%"``; a list has keys
-    whose values have spaces. Or it is a link of the library, which keys may follow: ``"starlink/down rate=50Mbit"``. Seed, sender and receiver are the
-    address of its random numbers: equal addresses give equal links, those of ``cohaptic link`` with the same seed.
+    ``spec`` has one of three forms: words of ``tc-netem`` such as ``"delay 20ms 5ms loss 1%"``; keys of a scene such as ``"delay=20ms jitter=5ms loss=1%"``,
+    or a list of keys if a value has spaces; or the name of a link of the library, with further keys if wanted: ``"starlink/down rate=50Mbit"``. Seed,
+    sender and receiver are the address of the random numbers. Links with equal addresses have equal random numbers, and so has ``cohaptic link`` with
+    the same seed.
 
     >>> sent = Link("delay 20ms loss 10%", seed=1).send(np.arange(5) * 0.01, 64)
     >>> sent.arrived
@@ -87,7 +88,7 @@ class Link:
     >>> [CAUSES[code] for code in sent.cause[:2]]
     ['loss', '']
 
-    Step by step, with any object on board:
+    Step by step, with any object as payload:
 
     >>> link = Link("delay 20ms")
     >>> link.handle_packet(0.0, 64, "hello")
@@ -105,9 +106,10 @@ class Link:
         self._said = " ".join(spec.split() if isinstance(spec, str) else keys)
 
     def send(self, times: npt.ArrayLike, sizes: npt.ArrayLike = 64, *, ecn: bool = False) -> Sent:
-        """Sends packets at those times [s], which do not fall, and gives what becomes of each.
+        """Sends a packet at each of ``times`` [s], which must not decrease, and returns the fates of the packets.
 
-        The link is a new one for each call: what was sent before, and step by step, has no part in it. ``sizes`` [bytes] is one of all, or one of each.
+        Each call begins with a new link: packets of earlier calls, and packets that were offered step by step, have no influence. ``sizes`` [bytes] is one
+        size for all packets, or an array with a size for each packet.
         """
         at = np.ascontiguousarray(times, dtype=np.float64).reshape(-1)
         size = np.ascontiguousarray(sizes, dtype=np.uint64).reshape(-1)
@@ -117,10 +119,10 @@ class Link:
     def measure(
         self, packets: int = 100_000, every: float = 0.001, size: int = 64, *, ecn: bool = False
     ) -> dict[str, Any]:
-        """Sends a steady stream, a packet every so often [s], and gives the document of ``cohaptic link --json``.
+        """Sends a steady stream, a packet each ``every`` seconds, and returns the document of ``cohaptic link --json``.
 
-        It has the figures that the link was asked for and those that it achieved, without the speed of the emulator and the files. As in :meth:`send`,
-        the link is a new one for each call.
+        The document has the figures that the link was asked for and the figures that the link achieved, without the speed of the emulator and the files.
+        As in :meth:`send`, each call begins with a new link.
 
         >>> measured = Link("delay 20ms 5ms loss 1%", seed=1).measure()
         >>> measured["asked"]["loss"], measured["achieved"]["loss"]
@@ -132,32 +134,32 @@ class Link:
         return document
 
     def handle_packet(self, now: float, size: int = 64, payload: Any = None, *, ecn: bool = False) -> None:
-        """Offers a packet [s, bytes]. Instants must not fall from call to call."""
+        """Offers a packet of ``size`` bytes at the instant ``now`` [s]. Instants must not decrease from call to call."""
         self._native.handle_packet(now, size, payload, ecn)
 
     def poll(self, now: float) -> list[Event]:
-        """Lets time pass until then [s], and gives what has happened since the last call, in order."""
+        """Lets time pass until ``now`` [s], and returns the events since the last call, in order of time."""
         return [Event(*event) for event in self._native.poll(now)]
 
     @property
     def next(self) -> float | None:
-        """The instant at which :meth:`poll` is to be called next [s]; ``None`` if nothing is on the way.
+        """Instant at which :meth:`poll` must be called next [s]; ``None`` if no packet is on the way.
 
-        ``poll(link.next)`` gives what happens then, also where instants are those of ``time.time()``, whose numbers are 238 ns apart: where the nearest
-        number is before the arrival, ``next`` is the one after it.
+        ``poll(link.next)`` returns the events of this instant, also for instants of ``time.time()``, which are 238 ns apart as floating-point numbers: if
+        the nearest number is before the arrival, ``next`` is the next number after the arrival.
         """
         return self._native.next
 
     def change(self, now: float, spec: str | Iterable[str]) -> None:
-        """Replaces the link from now [s] on, with its packets on the way."""
+        """Replaces the configuration of the link from the instant ``now`` [s] on. Packets on the way stay on the way."""
         self._native.change(now, _keys(spec))
 
 
 def profile(name: str) -> dict[str, Any]:
-    """A link of the library with the source of each number: ``"starlink"``, or with the version, ``"starlink@1"``.
+    """Returns a link of the library with the source of each number. ``name`` is ``"starlink"``, or with a version ``"starlink@1"``.
 
-    ``down`` and ``up`` have the ``keys`` of the link as TOML, and the ``reasons`` of each key: its ``grade``, the ``sources`` and ``how`` the number follows
-    from them. ``cohaptic link --list`` lists the names.
+    ``down`` and ``up`` have the ``keys`` of the link as TOML, and the ``reasons`` of each key: its ``grade``, the ``sources``, and ``how`` the number follows
+    from the sources. ``cohaptic link --list`` lists the names.
 
     >>> dish = profile("starlink")
     >>> dish["grade"], dish["down"]["keys"]["rate"], dish["down"]["reasons"]["rate"]["sources"]

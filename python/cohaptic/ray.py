@@ -1,4 +1,4 @@
-"""An executor whose workers are those of Ray, which must be installed."""
+"""Executor with the workers of Ray. The package ``ray`` must be installed."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import ray
 
 
 class RayExecutor(Executor):
-    """A ``concurrent.futures.Executor`` over the cluster that ``ray.init`` has joined, as for :func:`cohaptic.campaign`.
+    """A ``concurrent.futures.Executor`` over the cluster that ``ray.init`` has joined, for :func:`cohaptic.campaign` for example.
 
-    ``options`` are those of a remote function: ``num_cpus`` of each call, ``max_retries`` after the loss of a worker, and so on. Workers need the packages
-    that the calls come from.
+    ``options`` are the options of a remote function of Ray, such as ``num_cpus`` of each call and ``max_retries`` after the loss of a worker. Workers need
+    the packages that define the called functions.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -23,7 +23,7 @@ class RayExecutor(Executor):
         self._is_shut = False
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Calls a function on some worker."""
+        """Calls a function on a worker."""
         if self._is_shut:
             raise RuntimeError("this executor was shut down")
         reference = self._call.remote(fn, args, kwargs)
@@ -33,7 +33,7 @@ class RayExecutor(Executor):
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Takes no more calls; the cluster goes on."""
+        """Refuses further calls. The cluster keeps running."""
         self._is_shut = True
         for future, reference in list(self._waiting.items()):
             if cancel_futures:

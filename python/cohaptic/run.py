@@ -1,4 +1,4 @@
-"""A run and what it left behind."""
+"""Runs with their results, and pictures."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Picture:
-    """A picture as SVG, which notebooks show.
+    """Picture as SVG. Notebooks show the picture.
 
     >>> Picture("<svg><title>Delays &amp; losses</title></svg>")
     <Picture: Delays & losses>
@@ -33,12 +33,12 @@ class Picture:
         return self.svg
 
     def save(self, path: str | Path) -> None:
-        """Writes the SVG file."""
+        """Writes the picture to an SVG file."""
         Path(path).write_text(self.svg, encoding="utf-8")
 
 
 class Run:
-    """What :meth:`cohaptic.Scene.run` gives.
+    """Result of :meth:`cohaptic.Scene.run`.
 
     >>> from cohaptic import Scene
     >>> scene = Scene('''
@@ -59,32 +59,32 @@ class Run:
 
     @property
     def title(self) -> str:
-        """That of the scene."""
+        """Title of the scene."""
         return self._native.title
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """The document of ``cohaptic run --json``, without the time that the run took and the files."""
+        """Document of ``cohaptic run --json``, without the wall time of the run and the files."""
         document: dict[str, Any] = json.loads(self._native.summary)
         return document
 
     @cached_property
     def trajectory(self) -> Table:
-        """A row a peer and tick, with the columns of ``trajectory.csv``."""
+        """Table with a row per peer and tick, and the columns of ``trajectory.csv``."""
         return self._kept(self._native.trajectory)
 
     @cached_property
     def packets(self) -> Table:
-        """A row a packet that arrived or was dropped, with the columns of ``packets.csv``; ``arrived`` is NaN for one that was dropped."""
+        """Table with a row per delivered or dropped packet, and the columns of ``packets.csv``. ``arrived`` is NaN for a dropped packet."""
         return self._kept(self._native.packets)
 
     @cached_property
     def links(self) -> Table:
-        """A row a link or access line, with the columns of ``links.csv``; ``mean-delay-s`` is NaN where nothing was delivered."""
+        """Table with a row per link or access line, and the columns of ``links.csv``. ``mean-delay-s`` is NaN for a link without a delivery."""
         return Table(self._native.links())
 
     def plot(self, name: str = "positions") -> Picture:
-        """The program's own picture: ``positions``, ``forces``, ``network``, and of an object that turns ``orientations`` and ``views``."""
+        """Returns a picture of ``cohaptic run``: ``positions``, ``forces`` or ``network``; for an object that turns also ``orientations`` or ``views``."""
         return Picture(self._native.picture(name))
 
     def _repr_svg_(self) -> str | None:

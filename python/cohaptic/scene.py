@@ -1,4 +1,4 @@
-"""A scene, and what can be asked of it."""
+"""Scenes: reading, changing, running and analysing."""
 
 from __future__ import annotations
 
@@ -18,54 +18,54 @@ from cohaptic.stability import Admittance, Boundary, Map, Stability, _key_range,
 _NO_VALUE: Any = object()
 
 MakeLaw = Callable[[Peer], Law]
-"""Makes the law of a peer: a class, mostly."""
+"""Function that makes the law of a peer; usually the class of the law."""
 
 
 @dataclass(frozen=True)
 class Expectation:
-    """One expectation of a scene, and what came out."""
+    """One expectation of a scene with its result."""
 
     expectation: str
-    """The section of ``[expect]``."""
+    """Section of ``[expect]``."""
     name: str
-    """The quantity that is compared, in words."""
+    """Compared quantity in words."""
     unit: str
-    """The unit of the numbers; empty for ratios."""
+    """Unit of the numbers; empty for ratios."""
     low: float | None
-    """The least value that is expected."""
+    """Least expected value; ``None`` without a lower bound."""
     high: float | None
-    """The greatest value that is expected."""
+    """Greatest expected value; ``None`` without an upper bound."""
     measured: float | None
-    """What came out, if it is a number."""
+    """Result as a number; ``None`` if the result is no number."""
     passed: bool
-    """Whether that is as expected."""
+    """``True`` if the result is as expected."""
     expected: str
-    """The expectation in words."""
+    """Expectation in words."""
     found: str
-    """What came out, in words."""
+    """Result in words."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """Whether a scene does what its ``[expect]`` says."""
+    """Result of the check of a scene against its ``[expect]``."""
 
     failures: list[str]
-    """A line for each expectation that does not hold."""
+    """Lines about the expectations that do not hold."""
     expectations: list[Expectation]
-    """What came out of each."""
+    """All expectations with their results."""
     notes: list[str]
-    """What was told in another way than it could be with more time."""
+    """Notes about results that were found in a less exact way to save time."""
 
     @property
     def passed(self) -> bool:
-        """Whether all expectations hold."""
+        """``True`` if all expectations hold."""
         return not self.failures
 
 
 class Scene:
     """A checked scene, from a file or from a text of TOML.
 
-    A text is told from the name of a file by a line break or a ``=``. Scenes do not change: :meth:`set` gives another one.
+    A source with a line break or a ``=`` is a text; any other source is the name of a file. Scenes do not change: :meth:`set` returns another scene.
 
     >>> scene = Scene('''
     ... scene = { duration = "1s", count = 3, title = "Three users" }
@@ -94,50 +94,50 @@ class Scene:
         return scene
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """The text and the overrides; files that the scene names are read again."""
+        """Pickles the text and the overrides. Files that the scene names are read again."""
         native = self._native
         return _parsed, (native.text, native.file, native.overrides)
 
     @property
     def title(self) -> str:
-        """Its title."""
+        """Title of the scene."""
         return self._native.title
 
     @property
     def text(self) -> str:
-        """The text that it was read from."""
+        """Text from which the scene was read."""
         return self._native.text
 
     @property
     def overrides(self) -> list[str]:
-        """What was set, as ``KEY=VALUE``."""
+        """Overrides of the text, as ``KEY=VALUE``."""
         return self._native.overrides
 
     @property
     def peers(self) -> list[str]:
-        """The names of its peers."""
+        """Names of the peers."""
         return self._native.peers
 
     @property
     def axes(self) -> int:
-        """How many axes it has."""
+        """Number of axes, 1 to 3."""
         return self._native.axes
 
     @property
     def duration(self) -> float:
-        """How long it lasts [s]."""
+        """Duration of the scene [s]."""
         return self._native.duration
 
     @property
     def seed(self) -> int:
-        """The seed of its random numbers."""
+        """Seed of all random numbers of the scene."""
         return self._native.seed
 
     def set(self, key: str | Mapping[str, Any], value: Any = _NO_VALUE) -> Scene:
-        """The scene with another value of a key, as by ``--set``: a number, a truth value, a list, a mapping, or a text such as ``"8ms"``.
+        """Returns the scene with another value of a key, as by ``--set``: a number, a truth value, a list, a mapping, or a text such as ``"8ms"``.
 
-        Like there, a text is taken as TOML if it is TOML. A mapping of keys to values in place of a key sets all of them at once, where
-        no scene makes sense with one of them alone.
+        As with ``--set``, a text that is TOML is read as TOML. A mapping of keys to values in place of a key sets all of the keys at once. Use a mapping
+        if the scene makes no sense with one of the changes alone.
 
         >>> scene = Scene('''
         ... scene = { duration = "1s" }
@@ -173,8 +173,9 @@ class Scene:
     ) -> Run:
         """Runs the scene in virtual time.
 
-        Without ``record`` no rows are kept, and a scene may be so large that only its summary fits into memory; then ``threads`` share the work where
-        that pays. ``measure`` names measures, or ``"all"``. ``law`` makes a coordination law for each peer in place of the scene's.
+        Without ``record`` no rows are kept, so a scene may be so large that only its summary fits into memory. ``threads`` then share the work if this is
+        faster; by default there is one thread per core. ``measure`` names measures, or is ``"all"``. ``law`` makes a coordination law for each peer, in
+        place of the law of the scene. With ``general`` everything is simulated, also parts that the scene does not need; the results are the same.
         """
         scene = self
         if seed is not None:
@@ -186,19 +187,19 @@ class Scene:
         return Run(_native.Run(scene._native, threads, general, record, record, law))
 
     def check(self, *, general: bool = False) -> Check:
-        """Whether the scene does what its ``[expect]`` says; a scene without one passes."""
+        """Checks the scene against its ``[expect]``. A scene without ``[expect]`` passes."""
         failures, expectations, notes = self._native.check(general)
         return Check(failures, [Expectation(**outcome) for outcome in json.loads(expectations)], notes)
 
     def explain(self) -> dict[str, Any]:
-        """What the scene makes the program model, what is left out, and what a run costs: the document of ``cohaptic explain --json``."""
+        """Returns the document of ``cohaptic explain --json``: the modelled parts of the scene, the parts left out, and the cost of a run."""
         document: dict[str, Any] = json.loads(self._native.explain())
         return document
 
     def stability(self, *, method: str = "reduced", law: MakeLaw | None = None) -> Stability:
-        """Whether the scene is stable, without simulating it, by the method ``reduced``, ``determinant`` or ``full``.
+        """Analyses the stability of the scene without a simulation, by the method ``reduced``, ``determinant`` or ``full``.
 
-        A linear ``law`` is judged by the method ``full``.
+        A ``law`` in Python must be linear, and is always analysed by the method ``full``.
         """
         return Stability(self._native, method, law)
 
@@ -210,7 +211,11 @@ class Scene:
         grid: tuple[int, int] = (60, 40),
         threads: int | None = None,
     ) -> Map:
-        """The radius over a grid of two keys, each as ``"coordination.stiffness=0..6000"`` or as key, lowest and highest value."""
+        """Returns the radius over a grid of two keys.
+
+        Each range is a text such as ``"coordination.stiffness=0..6000"``, or a tuple of the key, the lowest and the highest value. ``grid`` has the number
+        of values of x and of y.
+        """
         columns, rows = grid
         return Map._of(_native.map(self._native, _key_range(x), _key_range(y), columns, rows, threads or 0))
 
@@ -222,7 +227,7 @@ class Scene:
         samples: int | None = None,
         threads: int | None = None,
     ) -> Boundary:
-        """Every value of a key at which the scene turns stable or unstable; ranges are said as in :meth:`map`."""
+        """Returns every value of a key at which the scene becomes stable or unstable. The range has the form of :meth:`map`."""
         return Boundary._of(_native.boundary(self._native, _key_range(along), tolerance, samples, threads or 0))
 
     def admittance(
@@ -233,10 +238,10 @@ class Scene:
         axis: str | None = None,
         seen: str | None = None,
     ) -> Admittance:
-        """How fast the device of a peer moves for the force that pushes it, at frequencies [Hz].
+        """Returns the admittance at the device of a peer: velocity of the device divided by the force that pushes it, at ``frequencies`` [Hz].
 
-        Without frequencies they are 60 from 0.01 Hz to 100 Hz; without a peer it is that of the first one. ``axis`` is that of the push, ``seen`` that of the
-        motion.
+        By default there are 60 frequencies from 0.01 Hz to 100 Hz, and the peer is the first peer. ``axis`` is the axis of the push, and ``seen`` the axis
+        of the motion.
         """
         at = _spread if frequencies is None else [float(hz) for hz in _flat(frequencies)]
         return Admittance._of(_native.admittance(self._native, peer or self.peers[0], at, axis, seen))
@@ -256,7 +261,7 @@ def _flat(numbers: npt.ArrayLike) -> Any:
 
 
 def _toml(value: Any) -> str:
-    """A value as it stands behind ``--set KEY=``; within lists and mappings texts have quotes."""
+    """Returns a value as text for ``--set KEY=``. Texts within lists and mappings have quotes."""
     return value if isinstance(value, str) else _inner(value)
 
 

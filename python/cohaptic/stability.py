@@ -14,30 +14,30 @@ from cohaptic.run import Picture
 
 
 class Radius(NamedTuple):
-    """A number and how far the true one may be from it."""
+    """A number with the bound of its error."""
 
     value: float
     """The number."""
     error: float
-    """The true one lies within value ± error."""
+    """Bound of the error: the true number is within value ± error."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a scene that does not mix with the others."""
+    """A part of a scene whose motion is independent of all other parts."""
 
     kind: str
     """``whole``, ``together``, ``apart``, ``mode`` or ``loose-device``."""
     peer: str | None
-    """The first peer that it is about; ``None`` where it is about all."""
+    """First peer of the part; ``None`` for a part of all peers."""
     dimension: int
-    """How many states it has."""
+    """Number of states of the part."""
     multiplicity: int
-    """How often it is there."""
+    """Number of equal parts for which this part stands."""
     radius: float
-    """Its spectral radius."""
+    """Spectral radius of the part."""
     error: float
-    """How far that may be off."""
+    """Bound of the error of the radius."""
 
 
 @dataclass(frozen=True)
@@ -45,21 +45,21 @@ class ContactMode:
     """A combination of contacts in which a scene is linear, or a motion of an object that turns."""
 
     motion: str
-    """The components of the motion; empty for an object that does not turn."""
+    """Components of the motion; empty for an object that does not turn."""
     contacts: str
-    """Which contacts are closed; empty for a linear scene."""
+    """Closed contacts; empty for a linear scene."""
     verdict: str
-    """As if it lasted."""
+    """Verdict on the mode, as if the mode lasted."""
     radius: float
-    """The largest of its parts."""
+    """Largest radius of the parts."""
     error: float
-    """How far that may be off."""
+    """Bound of the error of the radius."""
     parts: list[Part]
-    """The parts that do not mix."""
+    """Parts with independent motions."""
 
 
 class Stability:
-    """Whether a scene is stable, and how sure that is.
+    """Verdict on the stability of a scene, with the numbers behind the verdict and their errors.
 
     >>> from cohaptic import Scene
     >>> scene = Scene('''
@@ -79,29 +79,29 @@ class Stability:
     """
 
     verdict: str
-    """``stable``, ``marginal``, ``overflow`` or ``unstable``: the answer to the question that `judged` names."""
+    """``stable``, ``marginal``, ``overflow`` or ``unstable``, by the criterion in :attr:`judged`."""
     judged: str
-    """``spectral-radius``; where links leave something to chance, ``mean-square``, or ``nominal`` where that cannot be followed."""
+    """Criterion: ``spectral-radius`` without random links, otherwise ``mean-square``, or ``nominal`` if the mean square cannot be computed."""
     left_out: list[str]
-    """The random parts of the links that a nominal verdict leaves out, such as ``random loss``; empty otherwise."""
+    """Random parts of the links that a nominal verdict leaves out, such as ``random loss``; empty for other verdicts."""
     radius: float
-    """The spectral radius over a frame, with nothing left to chance."""
+    """Spectral radius over a frame, without the random parts of links."""
     error: float
-    """How far that may be off."""
+    """Bound of the error of the spectral radius."""
     mean_square: Radius | None
-    """The radius of the second moment, where links leave something to chance and it can be followed."""
+    """Radius of the second moment; ``None`` without random links, and if the second moment cannot be computed."""
     method: str
-    """The method that was taken."""
+    """Method of the analysis."""
     frame: float
-    """The span that the radius is over [s]."""
+    """Length of the frame [s]."""
     dimension: int
-    """How many states there are."""
+    """Number of states."""
     rigid_modes: int
-    """How many rigid-body modes were removed."""
+    """Number of rigid-body modes that were removed."""
     modes: list[ContactMode]
-    """One for a linear scene; else one for each combination of contacts."""
+    """Modes of contact: one for a linear scene, otherwise one for each combination of contacts."""
     notes: list[str]
-    """What the verdict leaves out."""
+    """Parts of the scene that the verdict leaves out, in words."""
 
     def __init__(self, scene: _native.Scene, method: str, law: Any | None) -> None:
         said = _native.stability(scene, method, law)
@@ -118,12 +118,12 @@ class Stability:
 
     @property
     def stable(self) -> bool:
-        """Whether the verdict is ``stable``."""
+        """``True`` if the verdict is ``stable``."""
         return self.verdict == "stable"
 
     @property
     def parts(self) -> list[Part]:
-        """The parts of the mode with the largest radius, of several the last."""
+        """Parts of the mode with the largest radius; of several such modes, the last."""
         return max(reversed(self.modes), key=lambda mode: mode.radius).parts
 
     @cached_property
@@ -132,27 +132,27 @@ class Stability:
 
     @property
     def matrix(self) -> np.ndarray:
-        """The monodromy matrix: what one frame multiplies the relative state by, with nothing left to chance."""
+        """Monodromy matrix: the matrix by which one frame multiplies the relative state, without the random parts of links."""
         return self._monodromy[0]
 
     @property
     def matrix_error(self) -> float:
-        """A bound of the errors of the entries of the matrix, as the largest sum over a row."""
+        """Bound of the errors of the entries of the matrix, as the largest sum over a row."""
         return self._monodromy[5]
 
     @property
     def states(self) -> list[tuple[str, str]]:
-        """The peer and the kind of each row of the matrix. Velocities are multiplied by :attr:`velocity_time`."""
+        """Peer and kind of the state of each row of the matrix. Velocities are multiplied by :attr:`velocity_time`."""
         return self._monodromy[1]
 
     @property
     def velocity_time(self) -> float:
-        """What velocities in the state are multiplied by to be lengths [s]."""
+        """Time by which velocities of the state are multiplied, so that they are lengths [s]."""
         return self._monodromy[3]
 
     @cached_property
     def eigenvalues(self) -> np.ndarray:
-        """The eigenvalues of the matrix, by falling modulus."""
+        """Eigenvalues of the matrix, in the order of decreasing modulus."""
         return _native.eigenvalues(self.matrix.tolist())
 
     def __repr__(self) -> str:
@@ -162,26 +162,26 @@ class Stability:
 
 @dataclass(frozen=True)
 class Map:
-    """The radius over a grid of two keys; arrays have a row for each value of y."""
+    """Radius over a grid of two keys. Arrays have a row for each value of y."""
 
     keys: tuple[str, str]
-    """The keys along x and y."""
+    """Keys along x and y."""
     units: tuple[str, str]
-    """The units of their numbers: ``ms`` or ``%`` as in the range, ``N/m`` of a stiffness; empty where there is none."""
+    """Units of the two keys: ``ms`` or ``%`` as in the range, ``N/m`` for a stiffness; empty for a number without a unit."""
     x: np.ndarray
-    """The values of the first key."""
+    """Values of the first key."""
     y: np.ndarray
-    """The values of the second key."""
+    """Values of the second key."""
     radius: np.ndarray
-    """The radius, by the criterion."""
+    """Radius of each cell, by the criterion."""
     verdict: np.ndarray
-    """The verdict on each cell; a radius near 1 is computed again with a bound for it."""
+    """Verdict on each cell. A radius near 1 is computed again with a bound of its error."""
     nominal: np.ndarray
-    """Which cells leave out what their links leave to chance."""
+    """``True`` for a cell whose verdict leaves out random parts of links."""
     criterion: str
-    """``spectral-radius`` or ``mean-square``."""
+    """Criterion of the radii: ``spectral-radius`` or ``mean-square``."""
     contours: list[np.ndarray]
-    """Where the radius is 1: lines with a row (x, y) for each point."""
+    """Lines on which the radius is 1, with a row (x, y) for each point."""
     _drawing: _native.Drawing = field(repr=False)
 
     @classmethod
@@ -193,18 +193,18 @@ class Map:
 
     @property
     def stable(self) -> np.ndarray:
-        """Which cells are stable."""
+        """``True`` for each stable cell."""
         return np.asarray(self.verdict == "stable")
 
     def plot(self) -> Picture:
-        """The program's own picture: the outline of the stable region, shaded."""
+        """Returns the picture of ``cohaptic stability map``: the shaded outline of the stable region."""
         return Picture(self._drawing.svg())
 
     def _repr_svg_(self) -> str:
         return self._drawing.svg()
 
     def to_xarray(self) -> Any:
-        """The map as an ``xarray.Dataset``, which must be installed."""
+        """Returns the map as an ``xarray.Dataset``. The package ``xarray`` must be installed."""
         import xarray
 
         (x, y), (x_unit, y_unit) = self.keys, self.units
@@ -216,44 +216,44 @@ class Map:
 
 
 class Crossing(NamedTuple):
-    """A value at which the verdict changes."""
+    """Value of a key at which the verdict changes."""
 
     value: float
-    """The value."""
+    """Value of the key at the crossing."""
     before: str
-    """The verdict below it."""
+    """Verdict below the value."""
     after: str
-    """The verdict above it."""
+    """Verdict above the value."""
 
 
 @dataclass(frozen=True)
 class Boundary:
-    """Every crossing along a key."""
+    """Every crossing of the stability boundary along a key."""
 
     key: str
-    """The key."""
+    """Key that was varied."""
     unit: str
-    """The unit of its numbers, as in :attr:`Map.units`."""
+    """Unit of the key, as in :attr:`Map.units`."""
     criterion: str
-    """``spectral-radius`` or ``mean-square``."""
+    """Criterion of the radii: ``spectral-radius`` or ``mean-square``."""
     first: str
-    """The verdict at the lower end."""
+    """Verdict at the lower end of the range."""
     crossings: list[Crossing]
-    """In ascending order."""
+    """Crossings, in ascending order of the value."""
     marginal: list[tuple[float, float]]
-    """Where the radius stays at 1, or touches it, as closely as can be told."""
+    """Intervals in which the radius stays at 1 or touches 1, within the errors of the radii."""
     tolerance: float
-    """How closely each crossing was found."""
+    """Width to which each crossing was located, in the unit of the key."""
     is_settled: bool
-    """Whether every interval was looked at as closely as it needs."""
+    """``True`` if every interval was checked as closely as necessary."""
     nominal: int
-    """How many of the values leave out what their links leave to chance."""
+    """Number of checked values whose verdict leaves out random parts of links."""
     values: np.ndarray
-    """Every value that was looked at."""
+    """Checked values of the key."""
     radius: np.ndarray
-    """Its radius, by the criterion."""
+    """Radius at each checked value, by the criterion."""
     error: np.ndarray
-    """How far that may be off."""
+    """Bound of the error of each radius."""
     _drawing: _native.Drawing = field(repr=False)
 
     @classmethod
@@ -262,7 +262,7 @@ class Boundary:
         return cls(_drawing=drawing, **{**said, "crossings": [Crossing(*crossing) for crossing in said["crossings"]]})
 
     def plot(self) -> Picture:
-        """The program's own picture: the radius along the key, with the crossings."""
+        """Returns the picture of ``cohaptic stability boundary``: the radius along the key, with the crossings."""
         return Picture(self._drawing.svg())
 
     def _repr_svg_(self) -> str:
@@ -271,30 +271,30 @@ class Boundary:
 
 @dataclass(frozen=True)
 class Admittance:
-    """Velocity over force at the device of a peer. NumPy takes it as its :attr:`values`."""
+    """Velocity divided by force at the device of a peer. NumPy functions take the object in place of its :attr:`values`."""
 
     frequencies: np.ndarray
-    """In hertz."""
+    """Frequencies [Hz]."""
     values: np.ndarray
-    """Complex [m/(N·s)]; for a turn [rad/(N·m·s)]."""
+    """Complex admittance at each frequency [m/(N·s)]; for a rotation [rad/(N·m·s)]."""
     errors: np.ndarray
-    """How far rounding may have moved each at most."""
+    """Bound of the rounding error of each value."""
     verdict: str
-    """That on the scene; an unstable one has no steady state, and nothing that could be measured."""
+    """Verdict on the stability of the scene. An unstable scene has no steady state, so its admittance cannot be measured."""
     radius: float
-    """The spectral radius of the scene."""
+    """Spectral radius of the scene."""
     error: float
-    """How far that may be off."""
+    """Bound of the error of the spectral radius."""
     stiffness: Radius
-    """What a slow hand feels [N/m]."""
+    """Stiffness that a slow hand feels [N/m]."""
     viscosity: Radius
-    """What a slow hand feels [N·s/m]."""
+    """Viscous damping that a slow hand feels [N·s/m]."""
     inertia: Radius
-    """What a slow hand feels [kg]."""
+    """Mass that a slow hand feels [kg]."""
     object_mass: float
-    """What the whole object alone would be felt as."""
+    """Mass that a slow hand would feel of the whole object alone [kg]."""
     notes: list[str]
-    """What the numbers leave out."""
+    """Parts of the scene that the numbers leave out, in words."""
     _drawing: _native.Drawing = field(repr=False)
 
     @classmethod
@@ -304,7 +304,7 @@ class Admittance:
         return cls(_drawing=drawing, **{**said, **felt})
 
     def plot(self) -> Picture:
-        """The program's own picture: a Bode plot."""
+        """Returns the picture of ``cohaptic admittance``: a Bode plot."""
         return Picture(self._drawing.svg())
 
     def _repr_svg_(self) -> str:
@@ -312,18 +312,18 @@ class Admittance:
 
     @property
     def magnitude_db(self) -> np.ndarray:
-        """Relative to 1 m/(N·s) [dB]."""
+        """Magnitude of the values, relative to 1 m/(N·s) [dB]."""
         decibels: np.ndarray = 20.0 * np.log10(np.abs(self.values))
         return decibels
 
     @property
     def phase(self) -> np.ndarray:
-        """In degrees, without jumps."""
+        """Phase of the values [degrees], without jumps by 360 degrees."""
         degrees: np.ndarray = np.degrees(np.unwrap(np.angle(self.values)))
         return degrees
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        """The complex values."""
+        """Returns the complex values."""
         return (
             np.array(self.values, dtype=dtype, copy=True) if copy else self.values.astype(dtype or complex, copy=False)
         )
@@ -340,7 +340,7 @@ _LOWEST, _HIGHEST, _POINTS = 0.01, 100.0, 60
 
 
 def _spread(highest: float) -> list[float]:
-    """The frequencies of ``cohaptic admittance``: each the same factor above the one before."""
+    """Returns the frequencies of ``cohaptic admittance``, in a geometric series."""
     top = min(_HIGHEST, highest)
     ratio = top / _LOWEST
     return [_LOWEST * math.pow(ratio, place / (_POINTS - 1)) for place in range(_POINTS - 1)] + [top]

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 class Table:
     """Columns by their names, as read-only NumPy arrays that are not copied.
 
-    It has the Arrow PyCapsule protocol: ``pyarrow.table(t)`` and ``polars.DataFrame(t)`` take it as it is, over the same memory, and
-    ``pandas.DataFrame.from_arrow(t)`` and queries of DuckDB by its name. A column
-    of names is kept as codes; Arrow gets a dictionary column.
+    Tables have the Arrow PyCapsule protocol. ``pyarrow.table(t)``, ``polars.DataFrame(t)``, ``pandas.DataFrame.from_arrow(t)`` and queries of DuckDB read a
+    table over the same memory. DuckDB finds the table by the name of its Python variable. A column of names is stored as codes, and is a dictionary
+    column in Arrow.
 
     >>> from cohaptic import Scene
     >>> scene = Scene('''
@@ -47,29 +47,29 @@ class Table:
         return name in self._native.names
 
     def keys(self) -> list[str]:
-        """The names of the columns, so that ``dict(table)`` has them with their arrays."""
+        """Returns the names of the columns. ``dict(table)`` maps these names to the arrays."""
         return self._native.names
 
     @property
     def rows(self) -> int:
-        """How many rows there are."""
+        """Number of rows."""
         return len(self._native)
 
     def categories(self, name: str) -> list[str] | None:
-        """The names that the codes of a column stand for; ``None`` for a column of numbers."""
+        """Returns the names for which the codes of a column stand; ``None`` for a column of numbers."""
         return self._native.categories(name)
 
     def decode(self, name: str) -> np.ndarray:
-        """A column of names as an array of text, which is a copy; a column of numbers as it is."""
+        """Returns a column of names as an array of texts, a copy. Returns a column of numbers unchanged."""
         names = self.categories(name)
         return self[name] if names is None else np.array(names, dtype=object)[self[name]]
 
     def unit(self, name: str) -> str:
-        """The unit of the column of a key that was varied: ``ms`` or ``%`` as its values have it, ``N/m`` of a stiffness; empty for other columns."""
+        """Returns the unit of the column of a varied key: ``ms`` or ``%`` as in its values, ``N/m`` for a stiffness; empty for other columns."""
         return self._native.unit(name)
 
     def to_pandas(self) -> Any:
-        """The table as a ``pandas.DataFrame``, which must be installed: a copy, in which columns of names are categorical.
+        """Returns a copy of the table as a ``pandas.DataFrame``, with categorical columns of names. The package ``pandas`` must be installed.
 
         ``frame.attrs["units"]`` maps columns to their units.
         """
@@ -84,15 +84,15 @@ class Table:
         return frame
 
     def address(self, name: str) -> int:
-        """Where the numbers of a column begin in memory: those of the NumPy array, and those that Arrow gets."""
+        """Returns the address in memory of the numbers of a column. The NumPy array and Arrow share this memory."""
         return self._native.address(name)
 
     def __arrow_c_schema__(self) -> object:
-        """The schema, by the Arrow PyCapsule protocol."""
+        """Returns the schema, by the Arrow PyCapsule protocol."""
         return self._native.__arrow_c_schema__()
 
     def __arrow_c_stream__(self, requested_schema: Any | None = None) -> object:
-        """The rows, by the Arrow PyCapsule protocol."""
+        """Returns the rows, by the Arrow PyCapsule protocol."""
         return self._native.__arrow_c_stream__(requested_schema)
 
     def __repr__(self) -> str:
