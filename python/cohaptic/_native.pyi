@@ -10,50 +10,50 @@ __all__ = ["Campaign", "CampaignAnswer", "Delays", "Drawing", "Held", "Link", "R
 @final
 class Campaign:
     """
-    A campaign or a comparison that was checked, any runs of which can be made in any process.
+    Checked campaign or comparison. Any process can do any of the runs.
     """
     def __new__(cls, /, text: str, file: str | PathLike[str], overrides: SupportsGetItem[int, str], vary: SupportsGetItem[int, str], runs: SupportsIndex, threads: SupportsIndex, strategies: str | None = None, roster: str | None = None) -> Campaign:
         """
-        Keys are varied as by `cohaptic campaign --vary`. With strategies it is a comparison of these, as by `cohaptic compare --strategies`. Without a roster, all
-        combinations are checked.
+        Returns a campaign over keys as for `cohaptic campaign --vary`. With `strategies`, as for `cohaptic compare --strategies`, returns a comparison.
+        Without a roster, all combinations are checked.
         """
     def answer(self, /, rows: "list[list[int | float | str | None]]", verdicts: "bool", threads: "int") -> "CampaignAnswer":
         """
-        What the rows of all runs come to. Combinations are judged on that number of threads, 0 for one a core: those of a comparison always, those of a campaign with
-        `verdicts`.
+        Returns the results of the rows of all runs. The combinations of a comparison are judged, and with `verdicts` the combinations of a campaign. `threads`:
+        number of threads for the judgement, 0 for one per core.
         """
     @property
     def roster(self, /) -> str:
         """
-        Everybody who takes part, for the same campaign in another process.
+        Peers of all runs and left out combinations as a text, for the same campaign in another process.
         """
     def rows(self, /, start: "int", end: "int") -> "list[list[int | float | str | None]]":
         """
-        The rows of the runs from one number up to another, on this thread.
+        Returns the rows of the runs from `start` to before `end`, computed on this thread.
         """
     @property
     def runs(self, /) -> int:
         """
-        How many runs there are.
+        Number of runs.
         """
     def stop(self, /) -> None:
         """
-        Ends every computation of rows, now and later.
+        Ends all computations of rows, running and later ones.
         """
 
 @final
 class CampaignAnswer:
     """
-    What all runs of a campaign or of a comparison come to.
+    Results of all runs of a campaign or of a comparison.
     """
     def picture(self, /, file: str) -> str:
         """
-        The picture of that file name as SVG.
+        Returns the picture with the file name `file` as SVG.
         """
     @property
     def summary(self, /) -> str:
         """
-        As JSON.
+        Document of the runs as JSON.
         """
     @property
     def table(self, /) -> Table: ...
@@ -61,119 +61,121 @@ class CampaignAnswer:
 @final
 class Delays:
     """
-    A source of measurements.
+    Measurements from files or arrays.
     """
     def fit(self, /, offset: SupportsFloat | SupportsIndex | None, least: SupportsFloat | SupportsIndex | None, skew: bool, tick: SupportsFloat | SupportsIndex | None, cut: bool, hold_out: SupportsFloat | SupportsIndex | None) -> str:
         """
-        Estimates the link, and gives the document of `cohaptic fit --json`. `offset`, `least` and `tick` are in seconds.
+        Estimates the link, and returns the document of `cohaptic fit --json`. `offset`, `least` and `tick` are in seconds.
         """
     @staticmethod
     def of(sent: "numpy.ndarray", delays: "numpy.ndarray") -> "Delays":
         """
-        Delays \\[s\\] of packets sent at those instants \\[s\\]; NaN of packets that were lost.
+        Returns measurements from arrays: the instant of sending \\[s\\] and the delay \\[s\\] of each packet. The delay of a lost packet is NaN.
         """
     @staticmethod
     def read(file: str | PathLike[str], receiver: str | PathLike[str] | None = None, port: SupportsIndex | None = None, direction: str | None = None, split: SupportsFloat | SupportsIndex | None = None, instant_bytes: SupportsIndex | None = None, walk: bool = False) -> Delays:
         """
-        Reads a table of delays, a log of fates or a file of another program, or the captures of both ends. `direction` is `up`, `down` or `rtt`; `split` is the
-        share of the round trip that is the delay. `instant_bytes` leave at each instant of a line, and `walk` asks for a walk of the rate.
+        Reads a table of delays, a log of fates, a file of another program, or the captures of both ends. `direction` is `up`, `down` or `rtt`. `split` is the
+        share of the round trip that is the delay. `instant_bytes` is the number of bytes that leave at each instant of a line. `walk` asks for a walk of the
+        rate.
         """
 
 @final
 class Drawing:
     """
-    A picture as SVG.
+    Picture as SVG.
     """
     def __new__(cls, /, svg: str) -> Drawing:
         """
-        One that is drawn already.
+        Returns a picture that is drawn already.
         """
     def __reduce__(self, /) -> tuple[type, tuple[str]]:
         """
-        For other processes it is drawn.
+        Pickles the drawn picture, for other processes.
         """
     def svg(self, /) -> str:
         """
-        All of it.
+        Returns the whole text of the picture.
         """
 
 @final
 class Held:
     """
-    The newest samples from the others.
+    Newest samples of the other peers.
     """
     def __len__(self, /) -> int: ...
     @property
     def mean(self, /) -> State:
         """
-        Their mean.
+        Mean of the samples.
         """
     @property
     def positions(self, /) -> "numpy.ndarray":
         """
-        A row for each other peer, in the order of the scene \\[m\\].
+        Positions of the samples \\[m\\], a row for each other peer in the order of the scene.
         """
     @property
     def velocities(self, /) -> "numpy.ndarray":
         """
-        A row for each other peer, in the order of the scene [m/s].
+        Velocities of the samples [m/s], a row for each other peer in the order of the scene.
         """
 
 @final
 class Link:
     """
-    A link: a model, and one that runs step by step.
+    Link: the model, and a link of this model that runs step by step.
     """
     def __new__(cls, /, keys: SupportsGetItem[int, str], seed: SupportsIndex, sender: str, receiver: str) -> Link:
         """
-        A link of these keys, each `KEY=VALUE`. Seed and ends are the address of its random numbers.
+        Returns a link of keys, each `KEY=VALUE`. The seed and the names of both ends are the address of the random numbers.
         """
     def change(self, /, now: SupportsFloat | SupportsIndex, keys: SupportsGetItem[int, str]) -> None:
         """
-        Replaces the model from now \\[s\\] on, with its packets on the way.
+        Replaces the model from the instant `now` \\[s\\] on. Packets on the way stay on the way.
         """
     def handle_packet(self, /, now: SupportsFloat | SupportsIndex, size: SupportsIndex, payload: Any, ecn: bool) -> None:
         """
-        Offers a packet now \\[s\\].
+        Offers a packet at the instant `now` \\[s\\].
         """
     def measure(self, /, said: str, packets: SupportsIndex, every: SupportsFloat | SupportsIndex, size: SupportsIndex, ecn: bool) -> str:
         """
-        Sends a steady stream over a link that is new, one packet every so often \\[s\\], and gives the document of `cohaptic link --json`. `said`: the link as it was said.
+        Sends a steady stream over a new link, a packet each `every` \\[s\\], and returns the document of `cohaptic link --json`. `said`: the link as the
+        user wrote it.
         """
     @property
     def next(self, /) -> float | None:
         """
-        The instant at which something happens next \\[s\\]: `poll` of this number gives it. `None` if nothing is on the way.
+        Instant of the next event \\[s\\]: `poll` with this number returns the event. `None` if no packet is on the way.
         """
     def poll(self, /, now: "float") -> "list[tuple[typing.Any, int, int, float, float, str, int, bool, bool]]":
         """
-        Lets time pass until then \\[s\\], and gives what has happened.
+        Lets time pass until `now` \\[s\\], and returns the events since the last call.
         """
     def send(self, /, times: "numpy.ndarray", sizes: "numpy.ndarray", ecn: "bool") -> "tuple[typing.Any, ...]":
         """
-        Sends packets at those times \\[s\\] over a link that is new, and lets everything arrive.
+        Sends a packet at each of the times \\[s\\] over a new link, and returns the fates after the last arrival.
         """
 
 @final
 class Run:
     """
-    A run: its summary, and the rows that were kept.
+    Run with its summary and the kept rows.
     """
     def __new__(cls, /, scene: "Scene", threads: "int", general: "bool", trajectory: "bool", packets: "bool", law: "typing.Any | None" = None) -> Run:
         """
-        Runs a scene. `law`: makes the coordination law of each peer; `None` for that of the scene.
+        Runs a scene. `law`: function that makes the coordination law of each peer; `None` for the law of the scene.
         """
     def links(self, /) -> Table: ...
     @property
     def packets(self, /) -> Table | None: ...
     def picture(self, /, file: str) -> str:
         """
-        The picture of that file name as SVG.
+        Returns the picture with the file name `file` as SVG.
         """
     @property
     def summary(self, /) -> str:
         """
-        As JSON.
+        Document of the run as JSON.
         """
     @property
     def title(self, /) -> str: ...
@@ -183,26 +185,26 @@ class Run:
 @final
 class Scene:
     """
-    A checked scene.
+    Checked scene.
     """
     def __new__(cls, /, text: str, file: str | PathLike[str], overrides: SupportsGetItem[int, str]) -> Scene:
         """
-        Reads a scene from a text; `file` stands in messages, and its folder is where files that the scene names are looked for. Overrides are `KEY=VALUE`.
+        Reads a scene from a text. `file` is the name for messages, and its folder is the base of files that the scene names. Overrides are `KEY=VALUE`.
         """
     @property
     def axes(self, /) -> int: ...
     def check(self, /, general: bool) -> tuple[list[str], str, list[str]]:
         """
-        Failures, expectations as JSON, and notes.
+        Checks the scene. Returns the failures, the expectations as JSON, and the notes.
         """
     @property
     def duration(self, /) -> float:
         """
-        In seconds.
+        Duration \\[s\\].
         """
     def explain(self, /) -> str:
         """
-        What the scene makes the program model, as JSON.
+        Returns the modelled parts of the scene and the parts left out, as JSON.
         """
     @property
     def file(self, /) -> str: ...
@@ -225,96 +227,97 @@ class Scene:
 @final
 class State:
     """
-    Where a copy is, and how fast it is, along each axis.
+    Position and velocity of a copy along each axis.
     """
     @property
     def position(self, /) -> "numpy.ndarray":
         """
-        In metres.
+        Position \\[m\\], a number for each axis.
         """
     @property
     def velocity(self, /) -> "numpy.ndarray":
         """
-        In metres a second.
+        Velocity [m/s], a number for each axis.
         """
 
 @final
 class Table:
     """
-    Columns of one length. A column of NumPy is a view of the memory that Arrow gets.
+    Columns of equal length. NumPy arrays are views of the memory that Arrow gets.
     """
     def __arrow_c_schema__(self, /) -> "typing.Any":
         """
-        The schema, by the Arrow PyCapsule protocol.
+        Returns the schema, by the Arrow PyCapsule protocol.
         """
     def __arrow_c_stream__(self, /, requested_schema: "typing.Any | None" = None) -> "typing.Any":
         """
-        The rows, by the Arrow PyCapsule protocol.
+        Returns the rows, by the Arrow PyCapsule protocol.
         """
     def __len__(self, /) -> int: ...
     def address(self, /, name: str) -> int:
         """
-        Where the numbers of a column are.
+        Returns the address of the numbers of a column.
         """
     def categories(self, /, name: str) -> list[str] | None:
         """
-        The names that the codes of a column stand for; `None` for a column of numbers.
+        Returns the names for which the codes of a column stand; `None` for a column of numbers.
         """
     def column(self, /, name: "str") -> "numpy.ndarray":
         """
-        The numbers of a column without a copy; of a column of names their codes.
+        Returns the numbers of a column without a copy; for a column of names, the codes of the names.
         """
     @property
     def names(self, /) -> list[str]:
         """
-        The names of the columns.
+        Names of the columns.
         """
     def unit(self, /, name: str) -> str:
         """
-        The unit of a column; empty if it has none.
+        Returns the unit of a column; empty for a column without a unit.
         """
 
 def admittance(scene: "Scene", peer: "str", frequencies: "list[float] | typing.Callable[[float], list[float]]", axis: "str | None", seen: "str | None") -> "dict[str, typing.Any]":
     """
-    The admittance of a peer at frequencies \\[Hz\\], or at those that `spread` makes of the highest one, as a mapping.
+    Returns the admittance of a peer as a mapping: at frequencies \\[Hz\\], or at the frequencies that a function returns for the highest valid
+    frequency.
     """
 
 def boundary(scene: "Scene", along: "str", tolerance: "float | None", samples: "int | None", threads: "int") -> "dict[str, typing.Any]":
     """
-    Every crossing along a key, `KEY=LOW..HIGH`, as a mapping.
+    Returns every crossing along a key, `KEY=LOW..HIGH`, as a mapping.
     """
 
 def causes() -> list[str]:
     """
-    The names of the causes, by code: no cause first.
+    Returns the names of the causes of drops, indexed by code. Code 0 stands for no cause.
     """
 
 def eigenvalues(rows: "list[list[float]]") -> "numpy.ndarray":
     """
-    The eigenvalues of a square matrix, by falling modulus.
+    Returns the eigenvalues of a square matrix, in the order of decreasing modulus.
     """
 
 def is_profile(word: str) -> bool:
     """
-    Whether a word names a link of the library, such as `starlink/down`.
+    Returns whether a word names a link of the library, such as `starlink/down`.
     """
 
 def map(scene: "Scene", x: "str", y: "str", columns: "int", rows: "int", threads: "int") -> "dict[str, typing.Any]":
     """
-    The radius over a grid of two keys, each `KEY=LOW..HIGH`, as a mapping.
+    Returns the radius over a grid of two keys, each `KEY=LOW..HIGH`, as a mapping.
     """
 
 def monodromy(scene: "Scene", law: "typing.Any | None" = None) -> "tuple[numpy.ndarray, list[tuple[str, str]], float, float, int, float]":
     """
-    The monodromy matrix.
+    Returns the monodromy matrix with the names of its states and further facts.
     """
 
 def profile(name: str) -> str:
     """
-    The document of a link of the library: `starlink`, `starlink@1`.
+    Returns the document of a link of the library, such as `starlink` or `starlink@1`.
     """
 
 def stability(scene: "Scene", method: "str", law: "typing.Any | None" = None) -> "dict[str, typing.Any]":
     """
-    The verdict on the scene, as a mapping.
+    Returns the verdict on the scene as a mapping.
     """

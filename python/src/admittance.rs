@@ -18,7 +18,8 @@ fn axis(word: Option<&str>) -> PyResult<Option<PushedAxis>> {
     word.map(|word| PushedAxis::ALL.into_iter().find(|axis| axis.word() == word).ok_or_else(|| unknown(word))).transpose()
 }
 
-/// The admittance of a peer at frequencies \[Hz\], or at those that `spread` makes of the highest one, as a mapping.
+/// Returns the admittance of a peer as a mapping: at frequencies \[Hz\], or at the frequencies that a function returns for the highest valid
+/// frequency.
 #[pyfunction]
 #[pyo3(signature = (scene: "Scene", peer: "str", frequencies: "list[float] | typing.Callable[[float], list[float]]", axis: "str | None", seen: "str | None") -> "dict[str, typing.Any]")]
 #[pyo3(name = "admittance")]
@@ -56,7 +57,7 @@ pub(crate) fn admittance_of<'py>(
     let (title, peer, law) = (scene.scene.title.clone(), peer.to_owned(), scene.scene.coordination.strategy.name());
     let drawing = Drawing::of(move || {
         let curve = AdmittanceCurve { name: law, admittance: &admittance, response: &response };
-        // The same frequencies had a response before.
+        // The same frequencies had a response above, so there is no error here.
         admittance_picture(&title, &peer, &[curve]).unwrap_or_else(|_| Picture::new(title.as_str()))
     });
     said.set_item("drawing", drawing)?;

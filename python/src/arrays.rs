@@ -4,7 +4,7 @@ use numpy::ndarray::{Array2, ArrayView1};
 use numpy::{Element, IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 
-/// A read-only array over numbers that `owner` keeps alive and never changes: nothing is copied.
+/// Returns a read-only array over numbers, without a copy. `owner` keeps the numbers alive and never changes them.
 pub(crate) fn view<'py, T: Element>(owner: Bound<'py, PyAny>, numbers: &[T]) -> PyResult<Bound<'py, PyArray1<T>>> {
     let numbers = ArrayView1::from(numbers);
     // SAFETY: the callers' numbers lie in reference-counted buffers of a frozen object, which are never reallocated or written to; the array holds a
@@ -21,7 +21,7 @@ fn read_only(array: &Bound<'_, PyAny>) -> PyResult<()> {
     array.call_method("setflags", (), Some(&keywords)).map(drop)
 }
 
-/// Rows of one length as an array that owns them.
+/// Returns rows of equal length as an array that owns the numbers.
 pub(crate) fn matrix<T: Element>(py: Python<'_>, rows: usize, columns: usize, numbers: Vec<T>) -> PyResult<Bound<'_, PyArray2<T>>> {
     Array2::from_shape_vec((rows, columns), numbers).map(|array| array.into_pyarray(py)).map_err(|error| crate::errors::of_value(&error))
 }

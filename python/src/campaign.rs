@@ -17,27 +17,27 @@ use crate::interrupt::{Stop, interruptible, on_threads};
 use crate::scene::json;
 use crate::table::Table;
 
-/// A campaign or a comparison that was checked, any runs of which can be made in any process.
+/// Checked campaign or comparison. Any process can do any of the runs.
 #[pyclass(frozen, module = "cohaptic._native")]
 #[derive(Debug)]
 pub(crate) struct Campaign {
     campaign: SpreadCampaign,
     is_comparison: bool,
-    /// Ends what is being computed, in whatever thread.
+    /// Mark that ends all computations, in every thread.
     stop: Stop,
 }
 
-/// What all runs of a campaign or of a comparison come to.
+/// Results of all runs of a campaign or of a comparison.
 #[pyclass(frozen, module = "cohaptic._native")]
 #[derive(Debug)]
 pub(crate) struct CampaignAnswer {
     table: Py<Table>,
     document: String,
-    /// `None` for a comparison.
+    /// Results for pictures; `None` for a comparison.
     finished: Option<campaign::Finished>,
 }
 
-/// Ends with either.
+/// Watch that ends a computation if one of two marks is set.
 struct Either<'a>(&'a Stop, &'a Stop);
 
 impl Watch for Either<'_> {
@@ -53,7 +53,7 @@ fn refused(py: Python<'_>, error: &CampaignError) -> PyErr {
     }
 }
 
-/// The keys that are varied: the strategies before the others, if strategies are compared.
+/// Returns the varied keys. If strategies are compared, their key comes first.
 fn variations(vary: &[String], strategies: Option<&str>) -> PyResult<Vec<Variation>> {
     let strategies = strategies.map(Strategies::parse).transpose().map_err(|error| of_value(&error))?;
     let mut variations: Vec<Variation> = strategies.iter().map(Strategies::variation).collect();
@@ -69,8 +69,8 @@ fn variations(vary: &[String], strategies: Option<&str>) -> PyResult<Vec<Variati
 
 #[pymethods]
 impl Campaign {
-    /// Keys are varied as by `cohaptic campaign --vary`. With strategies it is a comparison of these, as by `cohaptic compare --strategies`. Without a roster, all
-    /// combinations are checked.
+    /// Returns a campaign over keys as for `cohaptic campaign --vary`. With `strategies`, as for `cohaptic compare --strategies`, returns a comparison.
+    /// Without a roster, all combinations are checked.
     #[new]
     #[pyo3(signature = (text, file, overrides, vary, runs, threads, strategies = None, roster = None))]
     fn new(
@@ -100,19 +100,19 @@ impl Campaign {
         Ok(Self { campaign: campaign.map_err(|error| refused(py, &error))?, is_comparison, stop: Stop::default() })
     }
 
-    /// How many runs there are.
+    /// Number of runs.
     #[getter]
     fn runs(&self) -> u64 {
         self.campaign.runs()
     }
 
-    /// Everybody who takes part, for the same campaign in another process.
+    /// Peers of all runs and left out combinations as a text, for the same campaign in another process.
     #[getter]
     fn roster(&self) -> String {
         self.campaign.roster()
     }
 
-    /// The rows of the runs from one number up to another, on this thread.
+    /// Returns the rows of the runs from `start` to before `end`, computed on this thread.
     #[pyo3(signature = (start: "int", end: "int") -> "list[list[int | float | str | None]]")]
     fn rows<'py>(&self, py: Python<'py>, start: u64, end: u64) -> PyResult<Bound<'py, PyList>> {
         let rows = interruptible(py, |stop| self.campaign.rows(start..end, &Either(stop, &self.stop)))?.map_err(|error| refused(py, &error))?;
@@ -128,13 +128,13 @@ impl Campaign {
         PyList::new(py, rows.collect::<PyResult<Vec<_>>>()?)
     }
 
-    /// Ends every computation of rows, now and later.
+    /// Ends all computations of rows, running and later ones.
     fn stop(&self) {
         self.stop.ask();
     }
 
-    /// What the rows of all runs come to. Combinations are judged on that number of threads, 0 for one a core: those of a comparison always, those of a campaign with
-    /// `verdicts`.
+    /// Returns the results of the rows of all runs. The combinations of a comparison are judged, and with `verdicts` the combinations of a campaign. `threads`:
+    /// number of threads for the judgement, 0 for one per core.
     #[pyo3(signature = (rows: "list[list[int | float | str | None]]", verdicts: "bool", threads: "int") -> "CampaignAnswer")]
     fn answer(&self, py: Python<'_>, rows: Vec<Vec<Bound<'_, PyAny>>>, verdicts: bool, threads: usize) -> PyResult<CampaignAnswer> {
         let columns = self.campaign.columns();
@@ -158,7 +158,7 @@ impl Campaign {
 }
 
 impl Campaign {
-    /// The title of the scene of the first combination that is run.
+    /// Returns the title of the scene of the first accepted combination.
     fn title(&self, refused: &Refused) -> Result<String, CampaignError> {
         let plan = self.campaign.plan();
         let first = (0..plan.combinations()).find(|combination| !refused.contains_key(combination)).unwrap_or_default();
@@ -169,7 +169,7 @@ impl Campaign {
         let report = self.campaign.report(rows, judgements)?;
         let (title, notes) = (self.title(&report.refused)?, campaign::notes(&report));
         let mut finished = campaign::Finished { plan: self.campaign.plan().clone(), title, report, notes };
-        // What cannot be drawn is said, as by the program.
+        // The notes name pictures that cannot be drawn, as the notes of the program do.
         finished.notes.extend(campaign::pictures(&finished, Size::default()).notes);
         let document = json(&campaign::document(&finished, None));
         Ok((document, finished))
@@ -190,13 +190,13 @@ impl CampaignAnswer {
         self.table.clone_ref(py)
     }
 
-    /// As JSON.
+    /// Document of the runs as JSON.
     #[getter]
     fn summary(&self) -> &str {
         &self.document
     }
 
-    /// The picture of that file name as SVG.
+    /// Returns the picture with the file name `file` as SVG.
     fn picture(&self, py: Python<'_>, file: &str) -> PyResult<String> {
         let drawn = self.finished.as_ref().map(|finished| py.detach(|| campaign::pictures(finished, Size::default()))).unwrap_or_default();
         let names: Vec<&str> = drawn.pictures.iter().map(|(name, _)| name.trim_end_matches(".svg")).collect();

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 
 use crate::table::{Table, names};
 
-/// A cell of a row of Python.
+/// Returns the value of a cell that Python holds.
 pub(crate) fn value(cell: &Bound<'_, PyAny>, column: &Column) -> PyResult<Value> {
     if cell.is_none() {
         return Ok(Value::Absent);
@@ -21,7 +21,8 @@ pub(crate) fn value(cell: &Bound<'_, PyAny>, column: &Column) -> PyResult<Value>
     })
 }
 
-/// The rows of all runs as one table. The column of a key that was varied has the name of the key, and the unit of its values. Verdicts stand behind them.
+/// Returns the rows of all runs as one table. The column of a varied key has the name of the key, and the unit of its values. Columns of verdicts follow
+/// the columns of keys.
 pub(crate) fn table(campaign: &SpreadCampaign, rows: &[Row], judgements: &[Judgement]) -> PyResult<Table> {
     let variations = campaign.variations();
     let column = |(place, column): (usize, &Column)| {
@@ -31,7 +32,7 @@ pub(crate) fn table(campaign: &SpreadCampaign, rows: &[Row], judgements: &[Judge
     };
     let mut columns: Vec<(String, ArrayRef)> = campaign.columns().iter().enumerate().map(column).collect();
     if !judgements.is_empty() {
-        // The number of the run, of the combination and the seed stand before the keys.
+        // The columns before the keys are the number of the run, the number of the combination, and the seed.
         let at = 3 + variations.len();
         columns.splice(at..at, verdicts(campaign, rows, judgements));
     }
@@ -40,14 +41,14 @@ pub(crate) fn table(campaign: &SpreadCampaign, rows: &[Row], judgements: &[Judge
     Table::with_units(columns, unit)
 }
 
-/// The columns of verdicts: the judgement of its combination in each row.
+/// Returns the columns of verdicts. Each row has the judgement of its combination.
 fn verdicts(campaign: &SpreadCampaign, rows: &[Row], judgements: &[Judgement]) -> [(String, ArrayRef); 4] {
     let combination = campaign.columns().iter().position(|column| column.name == "combination").unwrap_or_default();
     let verdict = |row: &Row| match row[combination] {
         Value::Integer(place) => usize::try_from(place).ok().and_then(|place| judgements.get(place)).and_then(Judgement::verdict),
         Value::Absent | Value::Number(_) | Value::Text(_) => None,
     };
-    // A combination without a verdict has the cells of a file that are empty.
+    // A combination without a verdict has empty cells, as in a file.
     let text =
         |of: fn(&Verdict) -> &Arc<str>| coded(rows.iter().map(|row| verdict(row).map_or_else(|| Arc::from(""), |verdict| of(verdict).clone())));
     let number =
@@ -61,7 +62,7 @@ fn verdicts(campaign: &SpreadCampaign, rows: &[Row], judgements: &[Judgement]) -
     columns.map(|(name, column)| (name.to_owned(), column))
 }
 
-/// The column of those cells. An absent number is NaN, an absent text empty, and an integer is never absent.
+/// Returns the column with these cells. An absent number is NaN, and an absent text is empty. An integer is never absent.
 fn array<'a>(kind: Kind, cells: impl Iterator<Item = &'a Value>) -> ArrayRef {
     match kind {
         Kind::Integer => Arc::new(Int64Array::from_iter_values(cells.map(|cell| if let Value::Integer(count) = cell { *count } else { 0 }))),
@@ -70,12 +71,13 @@ fn array<'a>(kind: Kind, cells: impl Iterator<Item = &'a Value>) -> ArrayRef {
     }
 }
 
-/// The unit of values of a key: the one that all of them carry, or the one in which the key takes plain numbers; empty if there is none.
+/// Returns the unit of the values of a key: the unit `carried` by all values, or else the unit in which the key takes plain numbers. Empty for a key
+/// without a unit.
 pub(crate) fn unit_of(key: &str, carried: &str) -> String {
     if carried.is_empty() { FileSchema::Scene.unit_of(key) } else { carried }.to_owned()
 }
 
-/// Texts, each of which is kept once, in the order of their first appearance.
+/// Returns a column of texts. Each different text is stored once, in the order of the first appearance.
 fn coded(texts: impl Iterator<Item = Arc<str>>) -> ArrayRef {
     let mut known: Vec<String> = Vec::new();
     let codes = texts.map(|text| {

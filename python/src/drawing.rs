@@ -6,7 +6,7 @@ use cohaptic_picture::{Picture, Size};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
-/// A picture as SVG.
+/// Picture as SVG.
 #[pyclass(frozen, module = "cohaptic._native")]
 pub(crate) struct Drawing(Box<dyn Fn() -> String + Send + Sync>);
 
@@ -24,18 +24,18 @@ impl fmt::Debug for Drawing {
 
 #[pymethods]
 impl Drawing {
-    /// One that is drawn already.
+    /// Returns a picture that is drawn already.
     #[new]
     fn drawn(svg: String) -> Self {
         Self(Box::new(move || svg.clone()))
     }
 
-    /// All of it.
+    /// Returns the whole text of the picture.
     fn svg(&self, py: Python<'_>) -> String {
         py.detach(|| (self.0)())
     }
 
-    /// For other processes it is drawn.
+    /// Pickles the drawn picture, for other processes.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, (String,)) {
         (slf.get_type(), (slf.get().svg(slf.py()),))
     }

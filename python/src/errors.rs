@@ -7,13 +7,13 @@ use pyo3::prelude::*;
 
 const MODULE: &str = "cohaptic.errors";
 
-/// An exception of that class; an exception of the import if there is none.
+/// Returns an exception of the class, or the exception of the import if the class cannot be imported.
 fn exception(py: Python<'_>, class: &str, message: String) -> PyErr {
     let made = py.import(MODULE).and_then(|module| module.getattr(class)).and_then(|class| class.call1((message,)));
     made.map_or_else(|error| error, PyErr::from_value)
 }
 
-/// A scene, a link or a key that makes no sense, with its place.
+/// Returns the exception for a refused scene, link or key, with the place of the fault.
 pub(crate) fn of_scene(py: Python<'_>, error: &SceneError) -> PyErr {
     let place = error.diagnostic();
     let file = place.and_then(Diagnostic::file).map(|file| file.display().to_string());
@@ -33,17 +33,17 @@ pub(crate) fn of_scene(py: Python<'_>, error: &SceneError) -> PyErr {
     made.map_or_else(|error| error, PyErr::from_value)
 }
 
-/// A scene that has no such analysis.
+/// Returns the exception for a scene that the analysis does not cover.
 pub(crate) fn of_analysis(py: Python<'_>, error: &impl Display) -> PyErr {
     exception(py, "AnalysisError", error.to_string())
 }
 
-/// Measurements that have no link.
+/// Returns the exception for measurements without a fitting link.
 pub(crate) fn of_fault(py: Python<'_>, message: &str) -> PyErr {
     exception(py, "CohapticError", message.to_owned())
 }
 
-/// A value that makes no sense.
+/// Returns the exception for a refused value.
 pub(crate) fn of_value(error: &impl Display) -> PyErr {
     pyo3::exceptions::PyValueError::new_err(error.to_string())
 }

@@ -18,7 +18,7 @@ fn range(text: &str) -> PyResult<KeyRange> {
     KeyRange::parse(text).map_err(|error| of_value(&error))
 }
 
-/// What went wrong with a family.
+/// Returns the exception for an error of a family.
 fn refused(py: Python<'_>, error: &FamilyError) -> PyErr {
     match error {
         FamilyError::Scene(error) => of_scene(py, error),
@@ -34,7 +34,7 @@ impl Scene {
     }
 }
 
-/// The scene of a family with every open key at the lower end. Pictures have its title and the name of its law.
+/// Returns the scene of a family with every open key at the lower end. Pictures show the title and the name of the law of this scene.
 fn at_low(py: Python<'_>, family: &Family) -> PyResult<cohaptic_scene::Scene> {
     let low: Vec<f64> = family.keys().iter().map(|key| key.low).collect();
     family.scene(&low).map_err(|error| refused(py, &error))
@@ -44,7 +44,7 @@ fn criterion(family: &Family) -> &'static str {
     family.criterion().word()
 }
 
-/// The radius over a grid of two keys, each `KEY=LOW..HIGH`, as a mapping.
+/// Returns the radius over a grid of two keys, each `KEY=LOW..HIGH`, as a mapping.
 #[pyfunction]
 #[pyo3(name = "map", signature = (scene: "Scene", x: "str", y: "str", columns: "int", rows: "int", threads: "int") -> "dict[str, typing.Any]")]
 pub(crate) fn map_of<'py>(
@@ -97,7 +97,7 @@ pub(crate) fn map_of<'py>(
     Ok(said)
 }
 
-/// Every crossing along a key, `KEY=LOW..HIGH`, as a mapping.
+/// Returns every crossing along a key, `KEY=LOW..HIGH`, as a mapping.
 #[pyfunction]
 #[pyo3(name = "boundary", signature = (scene: "Scene", along: "str", tolerance: "float | None", samples: "int | None", threads: "int") -> "dict[str, typing.Any]")]
 pub(crate) fn boundary_of<'py>(

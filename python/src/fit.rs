@@ -16,7 +16,7 @@ use crate::errors::{of_fault, of_scene, of_value};
 use crate::interrupt::{Stop, interruptible};
 use crate::scene::json;
 
-/// The name that `cohaptic fit` has for the file with the link.
+/// Name that `cohaptic fit` gives to the file with the link.
 const FILE: &str = "link.toml";
 
 fn unreadable(py: Python<'_>, path: &Path, source: std::io::Error) -> PyErr {
@@ -31,7 +31,7 @@ fn open(py: Python<'_>, path: &Path) -> PyResult<LimitedFile> {
     LimitedFile::open(path, MOST_CAPTURE_BYTES).map_err(|error| unreadable(py, path, error))
 }
 
-/// A source of measurements.
+/// Measurements from files or arrays.
 #[pyclass(frozen, module = "cohaptic._native")]
 #[derive(Debug)]
 pub(crate) struct Delays {
@@ -40,8 +40,9 @@ pub(crate) struct Delays {
 
 #[pymethods]
 impl Delays {
-    /// Reads a table of delays, a log of fates or a file of another program, or the captures of both ends. `direction` is `up`, `down` or `rtt`; `split` is the
-    /// share of the round trip that is the delay. `instant_bytes` leave at each instant of a line, and `walk` asks for a walk of the rate.
+    /// Reads a table of delays, a log of fates, a file of another program, or the captures of both ends. `direction` is `up`, `down` or `rtt`. `split` is the
+    /// share of the round trip that is the delay. `instant_bytes` is the number of bytes that leave at each instant of a line. `walk` asks for a walk of the
+    /// rate.
     #[staticmethod]
     #[pyo3(signature = (file, receiver = None, port = None, direction = None, split = None, instant_bytes = None, walk = false))]
     #[expect(clippy::too_many_arguments, reason = "the options of `cohaptic fit`")]
@@ -78,7 +79,7 @@ impl Delays {
         Ok(Self { source: source.map_err(refused)? })
     }
 
-    /// Delays \[s\] of packets sent at those instants \[s\]; NaN of packets that were lost.
+    /// Returns measurements from arrays: the instant of sending \[s\] and the delay \[s\] of each packet. The delay of a lost packet is NaN.
     #[staticmethod]
     #[pyo3(signature = (sent: "numpy.ndarray", delays: "numpy.ndarray") -> "Delays")]
     fn of<'py>(py: Python<'py>, sent: PyReadonlyArray1<'py, f64>, delays: PyReadonlyArray1<'py, f64>) -> PyResult<Self> {
@@ -91,7 +92,7 @@ impl Delays {
         Ok(Self { source: Source::of(measurements) })
     }
 
-    /// Estimates the link, and gives the document of `cohaptic fit --json`. `offset`, `least` and `tick` are in seconds.
+    /// Estimates the link, and returns the document of `cohaptic fit --json`. `offset`, `least` and `tick` are in seconds.
     #[pyo3(signature = (offset, least, skew, tick, cut, hold_out))]
     #[expect(clippy::too_many_arguments, reason = "the options of `cohaptic fit`")]
     fn fit(

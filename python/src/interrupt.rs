@@ -8,13 +8,13 @@ use std::time::Duration;
 use cohaptic_stability::Watch;
 use pyo3::prelude::*;
 
-/// How long the thread of Python waits before it looks for signals again.
+/// Time between two checks of the thread of Python for signals.
 const BETWEEN: Duration = Duration::from_millis(20);
 
-/// Deep recursions are those of the main thread of a program.
+/// Stack of the computing thread \[bytes\], so that recursions may be as deep as on the main thread of a program.
 const STACK: usize = 16 << 20;
 
-/// Whether the computation is to end.
+/// Mark that ends the computation.
 #[derive(Debug, Default)]
 pub(crate) struct Stop(AtomicBool);
 
@@ -40,8 +40,8 @@ impl cohaptic_campaign::Watch for Stop {
     }
 }
 
-/// Computes on a thread of its own, with the interpreter released, while this one hears signals: only the main thread of Python may. Ctrl-C asks the work to stop,
-/// and is raised once it has.
+/// Runs `work` on a thread of its own, with the interpreter released. Meanwhile the calling thread checks for signals, because only the main thread of Python
+/// may do so. After Ctrl-C the work is asked to stop, and `KeyboardInterrupt` is raised once the work has stopped.
 pub(crate) fn interruptible<T: Send>(py: Python<'_>, work: impl FnOnce(&Stop) -> T + Send) -> PyResult<T> {
     let stop = Stop::default();
     let done = Stop::default();
@@ -67,11 +67,11 @@ pub(crate) fn interruptible<T: Send>(py: Python<'_>, work: impl FnOnce(&Stop) ->
     })
 }
 
-/// The same on that number of threads, 0 for one a core.
+/// Computes like [`interruptible`], on a number of threads; 0 for one thread per core.
 pub(crate) fn on_threads<T: Send>(py: Python<'_>, threads: usize, work: impl FnOnce(&Stop) -> T + Send) -> PyResult<T> {
     interruptible(py, |stop| match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(|| work(stop)),
-        // Without threads of its own it uses those that there are.
+        // Without a pool of its own, the work uses the threads of the global pool.
         Err(_) => work(stop),
     })
 }

@@ -13,10 +13,10 @@ use pyo3::types::PyDict;
 
 use crate::arrays::matrix;
 
-/// The first exception that a law has raised.
+/// First exception that a law raised.
 type Failure = Arc<Mutex<Option<PyErr>>>;
 
-/// Makes the law of each peer by a call.
+/// Maker of the laws: calls a Python function for the law of each peer.
 #[derive(Debug)]
 pub(crate) struct Laws {
     make: Py<PyAny>,
@@ -40,7 +40,7 @@ impl Laws {
         self.failure().is_some()
     }
 
-    /// Raises what a law has raised.
+    /// Raises the first exception of a law.
     pub(crate) fn raise(&self, _py: Python<'_>) -> PyResult<()> {
         self.failure().take().map_or(Ok(()), Err)
     }
@@ -49,7 +49,7 @@ impl Laws {
         self.failure.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Keeps the interpreter for all of `work`, which calls laws all the time.
+    /// Keeps the interpreter attached during `work`, because `work` calls laws all the time.
     pub(crate) fn attached<T>(work: impl FnOnce() -> T) -> T {
         Python::attach(|_| work())
     }
@@ -84,19 +84,19 @@ impl Strategies for &Laws {
     }
 }
 
-/// Keeps the first exception.
+/// Stores an exception, unless an earlier one is stored.
 fn keep(failure: &Failure, error: PyErr) {
     failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
 }
 
-/// The law of one peer; none if it could not be made, which ends the run.
+/// Law of one peer; `None` if the Python function raised an exception, which ends the run.
 #[derive(Debug)]
 pub(crate) struct PeerLaw(Option<Law>);
 
 #[derive(Debug)]
 struct Law {
     law: Py<PyAny>,
-    /// Its method.
+    /// Method `command` of the law.
     command: Py<PyAny>,
     remembers: bool,
     takes_gains: bool,
@@ -116,7 +116,7 @@ impl Law {
         Ok(force)
     }
 
-    /// Does something that may raise.
+    /// Calls `act`, and stores an exception that `act` raises.
     fn with(&mut self, act: impl FnOnce(&mut Self, Python<'_>) -> PyResult<()>) {
         Python::attach(|py| {
             if let Err(error) = act(self, py) {
@@ -156,14 +156,14 @@ impl<const A: usize> Strategy<A> for PeerLaw {
     }
 }
 
-/// One number for each axis; of one axis a number alone too.
+/// Returns the numbers of a Python value, one for each axis. For one axis, a plain number is accepted too.
 fn vector<const A: usize>(answer: &Bound<'_, PyAny>) -> PyResult<[f64; A]> {
     let found = numbers(answer)?;
     let count = found.len();
     <[f64; A]>::try_from(found).map_err(|_| PyValueError::new_err(format!("a force of {count} numbers: expected one for each of {A} axes")))
 }
 
-/// The numbers of an array, a list, or of a number alone.
+/// Returns the numbers of an array, of a list, or of a plain number.
 fn numbers(value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     if let Ok(array) = value.cast::<PyArray1<f64>>() {
         return array.readonly().to_vec().map_err(Into::into);
@@ -171,7 +171,7 @@ fn numbers(value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     value.extract::<f64>().map(|number| vec![number]).or_else(|_| value.extract::<Vec<f64>>())
 }
 
-/// Where a copy is, and how fast it is, along each axis.
+/// Position and velocity of a copy along each axis.
 #[pyclass(frozen, module = "cohaptic._native")]
 #[derive(Debug)]
 pub(crate) struct State {
@@ -188,27 +188,27 @@ impl State {
 
 #[pymethods]
 impl State {
-    /// In metres.
+    /// Position \[m\], a number for each axis.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.position.bind(py).clone()
     }
 
-    /// In metres a second.
+    /// Velocity [m/s], a number for each axis.
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.velocity.bind(py).clone()
     }
 }
 
-/// The newest samples from the others.
+/// Newest samples of the other peers.
 #[pyclass(frozen, module = "cohaptic._native")]
 #[derive(Debug)]
 pub(crate) struct Held {
     mean: Py<State>,
     others: usize,
     axes: usize,
-    /// Row after row.
+    /// Numbers of the samples, row after row.
     positions: Vec<f64>,
     velocities: Vec<f64>,
 }
@@ -228,7 +228,7 @@ impl Held {
 
 #[pymethods]
 impl Held {
-    /// Their mean.
+    /// Mean of the samples.
     #[getter]
     fn mean(&self, py: Python<'_>) -> Py<State> {
         self.mean.clone_ref(py)
@@ -238,13 +238,13 @@ impl Held {
         self.others
     }
 
-    /// A row for each other peer, in the order of the scene \[m\].
+    /// Positions of the samples \[m\], a row for each other peer in the order of the scene.
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         matrix(py, self.others, self.axes, self.positions.clone())
     }
 
-    /// A row for each other peer, in the order of the scene [m/s].
+    /// Velocities of the samples [m/s], a row for each other peer in the order of the scene.
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         matrix(py, self.others, self.axes, self.velocities.clone())

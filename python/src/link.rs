@@ -20,7 +20,7 @@ use crate::errors::of_scene;
 use crate::interrupt::{Stop, interruptible};
 use crate::scene::json;
 
-/// A link: a model, and one that runs step by step.
+/// Link: the model, and a link of this model that runs step by step.
 #[pyclass(frozen, module = "cohaptic._native")]
 #[derive(Debug)]
 pub(crate) struct Link {
@@ -30,26 +30,26 @@ pub(crate) struct Link {
     live: Mutex<Emulated<Arc<Py<PyAny>>>>,
 }
 
-/// The names of the causes, by code: no cause first.
+/// Returns the names of the causes of drops, indexed by code. Code 0 stands for no cause.
 #[pyfunction]
 pub(crate) fn causes() -> Vec<&'static str> {
     std::iter::once("").chain(DropCause::ALL.map(DropCause::name)).collect()
 }
 
-/// The document of a link of the library: `starlink`, `starlink@1`.
+/// Returns the document of a link of the library, such as `starlink` or `starlink@1`.
 #[pyfunction]
 pub(crate) fn profile(name: &str) -> PyResult<String> {
     let name: ProfileName = name.parse().map_err(|error: NameError| PyValueError::new_err(error.to_string()))?;
     Ok(json(&of_profile(&name.profile)))
 }
 
-/// Whether a word names a link of the library, such as `starlink/down`.
+/// Returns whether a word names a link of the library, such as `starlink/down`.
 #[pyfunction]
 pub(crate) fn is_profile(word: &str) -> bool {
     word.parse::<ProfileName>().is_ok()
 }
 
-/// The code of a packet that is not out of the link yet, however long one waits.
+/// Code of a packet that never comes out of the link.
 const ON_THE_WAY: u8 = u8::MAX;
 
 const fn cause(fate: Fate) -> u8 {
@@ -59,7 +59,7 @@ const fn cause(fate: Fate) -> u8 {
     }
 }
 
-/// What became of packets, by their places, and of the copies that the link made.
+/// Fates of packets, indexed by packet, and fates of the copies that the link made.
 #[derive(Debug)]
 struct Fates {
     arrived: Vec<f64>,
@@ -96,7 +96,7 @@ impl Fates {
     }
 }
 
-/// An instant of that many seconds, to the nearest nanosecond; `None` before the beginning and beyond the end of time.
+/// Returns the instant of a number of seconds, to the nearest nanosecond; `None` below zero and beyond the last instant.
 #[inline]
 fn instant(seconds: f64) -> Option<Instant> {
     // 2^64 ns and everything above it is no instant, and a comparison with NaN is false.
@@ -109,8 +109,8 @@ fn instant(seconds: f64) -> Option<Instant> {
     Some(Instant::from_nanos(whole.checked_mul(1_000_000_000)?.checked_add((rest + 0.5) as u64)?))
 }
 
-/// The number of seconds nearest to an instant or, where its own [`instant`] is before that one, the number above it: seconds since 1970 are 238 ns apart.
-/// `None` within the last microseconds of time, which no such number reaches.
+/// Returns the number of seconds nearest to an instant. If the [`instant`] of this number is before `at`, returns the next number: as floating-point
+/// numbers, seconds since 1970 are 238 ns apart. `None` for the last microseconds of time, which no number reaches.
 fn seconds(at: Instant) -> Option<f64> {
     let nearest = at.as_secs_f64();
     [nearest, nearest.next_up()].into_iter().find(|seconds| instant(*seconds).is_some_and(|reached| reached >= at))
@@ -124,10 +124,10 @@ fn gone_back(at: f64) -> PyErr {
     PyValueError::new_err(format!("time goes back at {at} s: expected no instant before an earlier one"))
 }
 
-/// How many packets are sent between two looks at whether to go on.
+/// Number of packets between two checks for an end of the computation.
 const BETWEEN: usize = 1 << 16;
 
-/// Arrivals, causes, marks, damages, and of copies: packets, numbers, arrivals, causes.
+/// Arrivals, causes, marks and damages of packets, and the packets, numbers, arrivals and causes of copies.
 type Sent<'py> = (
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<u8>>,
@@ -136,12 +136,12 @@ type Sent<'py> = (
     (Bound<'py, PyArray1<u64>>, Bound<'py, PyArray1<u8>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u8>>),
 );
 
-/// An event: payload, number, copy, offered and happened \[s\], fate, size, marked, damaged.
+/// Event: payload, number, copy, instant of the offer \[s\], instant of the fate \[s\], fate, size, marked, damaged.
 type Event = (Py<PyAny>, u64, u8, f64, f64, &'static str, u64, bool, bool);
 
 #[pymethods]
 impl Link {
-    /// A link of these keys, each `KEY=VALUE`. Seed and ends are the address of its random numbers.
+    /// Returns a link of keys, each `KEY=VALUE`. The seed and the names of both ends are the address of the random numbers.
     #[new]
     fn new(py: Python<'_>, keys: Vec<String>, seed: u64, sender: &str, receiver: &str) -> PyResult<Self> {
         let model = link_from_keys(&keys).map_err(|error| of_scene(py, &error))?;
@@ -150,7 +150,7 @@ impl Link {
         Ok(Self { model, seed, name, live })
     }
 
-    /// Sends packets at those times \[s\] over a link that is new, and lets everything arrive.
+    /// Sends a packet at each of the times \[s\] over a new link, and returns the fates after the last arrival.
     #[pyo3(signature = (times: "numpy.ndarray", sizes: "numpy.ndarray", ecn: "bool") -> "tuple[typing.Any, ...]")]
     fn send<'py>(&self, py: Python<'py>, times: PyReadonlyArray1<'py, f64>, sizes: PyReadonlyArray1<'py, u64>, ecn: bool) -> PyResult<Sent<'py>> {
         let (times, sizes) = (times.as_slice()?, sizes.as_slice()?);
@@ -169,7 +169,8 @@ impl Link {
         Ok((arrived.into_pyarray(py), cause.into_pyarray(py), marked.into_pyarray(py), damaged.into_pyarray(py), copies))
     }
 
-    /// Sends a steady stream over a link that is new, one packet every so often \[s\], and gives the document of `cohaptic link --json`. `said`: the link as it was said.
+    /// Sends a steady stream over a new link, a packet each `every` \[s\], and returns the document of `cohaptic link --json`. `said`: the link as the
+    /// user wrote it.
     fn measure(&self, py: Python<'_>, said: String, packets: u64, every: f64, size: u64, ecn: bool) -> PyResult<String> {
         if packets == 0 {
             return Err(PyValueError::new_err("0 packets: expected at least 1"));
@@ -193,14 +194,14 @@ impl Link {
         })
     }
 
-    /// Offers a packet now \[s\].
+    /// Offers a packet at the instant `now` \[s\].
     fn handle_packet(&self, now: f64, size: u64, payload: Py<PyAny>, ecn: bool) -> PyResult<()> {
         let at = instant(now).ok_or_else(|| no_instant(now))?;
         let info = PacketInfo { size: Bytes::new(size), ecn: if ecn { Ecn::Capable0 } else { Ecn::NotCapable } };
         self.live().handle_packet(at, info, Arc::new(payload)).map_err(|_| gone_back(now))
     }
 
-    /// Lets time pass until then \[s\], and gives what has happened.
+    /// Lets time pass until `now` \[s\], and returns the events since the last call.
     #[pyo3(signature = (now: "float") -> "list[tuple[typing.Any, int, int, float, float, str, int, bool, bool]]")]
     fn poll(&self, py: Python<'_>, now: f64) -> PyResult<Vec<Event>> {
         let at = instant(now).ok_or_else(|| no_instant(now))?;
@@ -224,13 +225,13 @@ impl Link {
         Ok(happened)
     }
 
-    /// The instant at which something happens next \[s\]: `poll` of this number gives it. `None` if nothing is on the way.
+    /// Instant of the next event \[s\]: `poll` with this number returns the event. `None` if no packet is on the way.
     #[getter]
     fn next(&self) -> Option<f64> {
         self.live().poll_timeout().and_then(seconds)
     }
 
-    /// Replaces the model from now \[s\] on, with its packets on the way.
+    /// Replaces the model from the instant `now` \[s\] on. Packets on the way stay on the way.
     fn change(&self, py: Python<'_>, now: f64, keys: Vec<String>) -> PyResult<()> {
         let at = instant(now).ok_or_else(|| no_instant(now))?;
         let model = link_from_keys(&keys).map_err(|error| of_scene(py, &error))?;

@@ -12,14 +12,14 @@ use pyo3::prelude::*;
 
 use crate::table::{Table, names};
 
-/// Every tick of every peer.
+/// Rows of all ticks of all peers.
 #[derive(Debug)]
 pub(crate) struct Trajectory {
     peers: Vec<String>,
     names: Vec<String>,
-    /// Which peer, by its place.
+    /// Index of the peer of each row.
     peer: Vec<i32>,
-    /// Row after row would need a copy later: each column by itself.
+    /// Columns of numbers. Rows would need a copy later.
     columns: Vec<Vec<f64>>,
     devices_turn: bool,
 }
@@ -90,10 +90,10 @@ impl Observer for Trajectory {
     }
 }
 
-/// Every packet that arrived or was dropped.
+/// Rows of all delivered and dropped packets.
 #[derive(Debug)]
 pub(crate) struct Packets {
-    /// Between which peers there are links, by sender and receiver.
+    /// Sender and receiver of each link.
     pairs: Vec<(usize, usize)>,
     peers: Vec<String>,
     link: Vec<i32>,
@@ -123,7 +123,7 @@ impl Packets {
     }
 }
 
-/// What can become of a packet, by code.
+/// Names of the fates, indexed by code.
 fn fates() -> impl Iterator<Item = String> {
     let others = [Fate::Delivered(Instant::ZERO), Fate::Duplicated].map(Fate::name).into_iter();
     others.chain(DropCause::ALL.map(DropCause::name)).map(str::to_owned)
@@ -152,7 +152,7 @@ impl Observer for Packets {
     }
 }
 
-/// One row a link and access line.
+/// Returns the table of links, a row per link and access line.
 pub(crate) fn links(summary: &Summary) -> PyResult<Table> {
     let name = |peer: usize| summary.peers[peer].name.as_str();
     let access = summary.access_lines.iter().map(|line| {
@@ -175,7 +175,7 @@ pub(crate) fn links(summary: &Summary) -> PyResult<Table> {
     Table::new(columns)
 }
 
-/// A place as a code.
+/// Returns an index as a code of a column.
 fn code(place: usize) -> i32 {
     i32::try_from(place).unwrap_or(i32::MAX)
 }

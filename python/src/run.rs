@@ -15,7 +15,7 @@ use crate::record::{Packets, Trajectory, links};
 use crate::scene::{Scene, json, model};
 use crate::table::Table;
 
-/// A run: its summary, and the rows that were kept.
+/// Run with its summary and the kept rows.
 #[pyclass(frozen, module = "cohaptic._native")]
 #[derive(Debug)]
 pub(crate) struct Run {
@@ -27,7 +27,7 @@ pub(crate) struct Run {
     pictures: Option<Pictures>,
 }
 
-/// Ends a run when that is asked for, or when a law has failed.
+/// Observer that ends a run if the user asks for the end, or if a law has failed.
 struct Asked<'a> {
     stop: &'a Stop,
     laws: Option<&'a Laws>,
@@ -43,7 +43,7 @@ impl Observer for Asked<'_> {
 
 #[pymethods]
 impl Run {
-    /// Runs a scene. `law`: makes the coordination law of each peer; `None` for that of the scene.
+    /// Runs a scene. `law`: function that makes the coordination law of each peer; `None` for the law of the scene.
     #[new]
     #[pyo3(signature = (scene: "Scene", threads: "int", general: "bool", trajectory: "bool", packets: "bool", law: "typing.Any | None" = None))]
     fn run(
@@ -87,7 +87,7 @@ impl Run {
         &self.title
     }
 
-    /// As JSON.
+    /// Document of the run as JSON.
     #[getter]
     fn summary(&self) -> &str {
         &self.document
@@ -107,7 +107,7 @@ impl Run {
         links(&self.summary)
     }
 
-    /// The picture of that file name as SVG.
+    /// Returns the picture with the file name `file` as SVG.
     fn picture(&self, py: Python<'_>, file: &str) -> PyResult<String> {
         let pictures = self.pictures.as_ref().ok_or_else(|| PyValueError::new_err("no pictures: expected a run with record=True"))?;
         let drawn = py.detach(|| pictures.drawn(Size::default()));

@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use crate::errors::of_scene;
 use crate::interrupt::interruptible;
 
-/// A checked scene.
+/// Checked scene.
 #[pyclass(frozen, module = "cohaptic._native")]
 #[derive(Debug)]
 pub(crate) struct Scene {
@@ -22,7 +22,7 @@ pub(crate) struct Scene {
 
 #[pymethods]
 impl Scene {
-    /// Reads a scene from a text; `file` stands in messages, and its folder is where files that the scene names are looked for. Overrides are `KEY=VALUE`.
+    /// Reads a scene from a text. `file` is the name for messages, and its folder is the base of files that the scene names. Overrides are `KEY=VALUE`.
     #[new]
     fn parse(py: Python<'_>, text: String, file: PathBuf, overrides: Vec<String>) -> PyResult<Self> {
         let scene = py.detach(|| Checked::parse(&text, &file, &overrides)).map_err(|error| of_scene(py, &error))?;
@@ -61,7 +61,7 @@ impl Scene {
         self.scene.seed
     }
 
-    /// In seconds.
+    /// Duration \[s\].
     #[getter]
     fn duration(&self) -> f64 {
         self.scene.duration.as_secs_f64()
@@ -77,13 +77,13 @@ impl Scene {
         self.scene.peers.iter().map(|peer| peer.name.clone()).collect()
     }
 
-    /// What the scene makes the program model, as JSON.
+    /// Returns the modelled parts of the scene and the parts left out, as JSON.
     fn explain(&self) -> String {
         let explanation = explain::explain(&self.scene);
         json(&cohaptic_answers::explanation(&self.scene, &explanation))
     }
 
-    /// Failures, expectations as JSON, and notes.
+    /// Checks the scene. Returns the failures, the expectations as JSON, and the notes.
     #[pyo3(signature = (general))]
     fn check(&self, py: Python<'_>, general: bool) -> PyResult<(Vec<String>, String, Vec<String>)> {
         self.refuse_too_large(model(general), true).map_err(|error| of_scene(py, &error))?;
@@ -93,7 +93,7 @@ impl Scene {
 }
 
 impl Scene {
-    /// Refuses a scene that does not fit into memory, at the place where there are too many peers.
+    /// Refuses a scene that does not fit into memory. The error names the place that asks for too many peers.
     pub(crate) fn refuse_too_large(&self, model: Model, watched: bool) -> Result<(), SceneError> {
         match too_large(&self.scene, model, watched) {
             Some(TooLarge { peer, reason }) => Err(at_peer(&self.text, &self.file, &self.overrides, peer, &reason)),
@@ -101,7 +101,7 @@ impl Scene {
         }
     }
 
-    /// The file with its folder, for other scenes of the same text.
+    /// File with its folder, for other scenes of the same text.
     pub(crate) fn source(&self) -> (&str, &Path, &[String]) {
         (&self.text, &self.file, &self.overrides)
     }
@@ -111,7 +111,7 @@ pub(crate) const fn model(general: bool) -> Model {
     if general { Model::General } else { Model::Least }
 }
 
-/// A document as text; documents hold nothing that JSON has not.
+/// Returns a document as text. Serialisation cannot fail, because documents hold only values that JSON has.
 pub(crate) fn json(document: &impl serde::Serialize) -> String {
     serde_json::to_string(document).unwrap_or_default()
 }

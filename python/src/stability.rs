@@ -16,10 +16,11 @@ use crate::interrupt::{Stop, interruptible};
 use crate::law::Laws;
 use crate::scene::Scene;
 
-/// The matrix, the names of its states as peer and kind, the frame \[s\], the time that velocities are multiplied by \[s\], the number of rigid-body modes, and the error.
+/// Matrix, names of the states as peer and kind, length of the frame \[s\], time by which velocities are multiplied \[s\], number of rigid-body modes, and
+/// bound of the error.
 type Matrix<'py> = (Bound<'py, PyArray2<f64>>, Vec<(String, String)>, f64, f64, usize, f64);
 
-/// The verdict on the scene, as a mapping.
+/// Returns the verdict on the scene as a mapping.
 #[pyfunction]
 #[pyo3(signature = (scene: "Scene", method: "str", law: "typing.Any | None" = None) -> "dict[str, typing.Any]")]
 pub(crate) fn stability<'py>(py: Python<'py>, scene: &Scene, method: &str, law: Option<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyDict>> {
@@ -42,7 +43,7 @@ pub(crate) fn stability<'py>(py: Python<'py>, scene: &Scene, method: &str, law: 
     document(py, scene, &judged.map_err(|error| of_analysis(py, &error))?)
 }
 
-/// The monodromy matrix.
+/// Returns the monodromy matrix with the names of its states and further facts.
 #[pyfunction]
 #[pyo3(signature = (scene: "Scene", law: "typing.Any | None" = None) -> "tuple[numpy.ndarray, list[tuple[str, str]], float, float, int, float]")]
 #[pyo3(name = "monodromy")]
@@ -62,7 +63,7 @@ pub(crate) fn monodromy_of<'py>(py: Python<'py>, scene: &Scene, law: Option<Boun
     Ok((matrix(py, rows, columns, numbers)?, states, found.frame.as_secs_f64(), found.time, found.rigid_modes, found.error))
 }
 
-/// The eigenvalues of a square matrix, by falling modulus.
+/// Returns the eigenvalues of a square matrix, in the order of decreasing modulus.
 #[pyfunction]
 #[pyo3(name = "eigenvalues", signature = (rows: "list[list[float]]") -> "numpy.ndarray")]
 pub(crate) fn eigenvalues_of(py: Python<'_>, rows: Vec<Vec<f64>>) -> PyResult<Bound<'_, PyArray1<Complex64>>> {

@@ -15,17 +15,17 @@ use pyo3::types::PyCapsule;
 use crate::arrays::view;
 use crate::errors::of_value;
 
-/// The key of a field's metadata under which its unit stands.
+/// Key of the unit in the metadata of a field.
 const UNIT: &str = "unit";
 
-/// Columns of one length. A column of NumPy is a view of the memory that Arrow gets.
+/// Columns of equal length. NumPy arrays are views of the memory that Arrow gets.
 #[pyclass(frozen, module = "cohaptic._native")]
 #[derive(Debug)]
 pub(crate) struct Table {
     batch: RecordBatch,
 }
 
-/// A column of names, each of which is kept once.
+/// Column of names. Each different name is stored once.
 pub(crate) fn names(codes: Vec<i32>, names: impl IntoIterator<Item = String>) -> ArrayRef {
     let names = StringArray::from_iter_values(names);
     // Codes are places in the names.
@@ -34,12 +34,13 @@ pub(crate) fn names(codes: Vec<i32>, names: impl IntoIterator<Item = String>) ->
 }
 
 impl Table {
-    /// Columns with their names, all of one length.
+    /// Returns a table of columns of equal length, with their names.
     pub(crate) fn new(columns: Vec<(String, ArrayRef)>) -> PyResult<Self> {
         Self::with_units(columns, |_| String::new())
     }
 
-    /// Columns with their names, all of one length, and the unit of each by its name: empty if it has none. Arrow gets it as metadata of the field.
+    /// Returns a table of columns of equal length, with their names and units. `unit` returns the unit of a name, empty for a column without a unit. Arrow
+    /// gets the unit as metadata of the field.
     pub(crate) fn with_units(columns: Vec<(String, ArrayRef)>, unit: impl Fn(&str) -> String) -> PyResult<Self> {
         let field = |(name, column): &(String, ArrayRef)| {
             let field = Field::new(name, column.data_type().clone(), column.null_count() > 0);
@@ -58,7 +59,7 @@ impl Table {
 
 #[pymethods]
 impl Table {
-    /// The names of the columns.
+    /// Names of the columns.
     #[getter]
     fn names(&self) -> Vec<String> {
         self.batch.schema().fields().iter().map(|field| field.name().clone()).collect()
@@ -68,14 +69,14 @@ impl Table {
         self.batch.num_rows()
     }
 
-    /// The unit of a column; empty if it has none.
+    /// Returns the unit of a column; empty for a column without a unit.
     fn unit(&self, name: &str) -> PyResult<String> {
         self.find(name)?;
         let schema = self.batch.schema();
         Ok(schema.field_with_name(name).ok().and_then(|field| field.metadata().get(UNIT).cloned()).unwrap_or_default())
     }
 
-    /// The numbers of a column without a copy; of a column of names their codes.
+    /// Returns the numbers of a column without a copy; for a column of names, the codes of the names.
     #[pyo3(signature = (name: "str") -> "numpy.ndarray")]
     fn column<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let array = slf.get().find(name)?;
@@ -89,27 +90,27 @@ impl Table {
         })
     }
 
-    /// The names that the codes of a column stand for; `None` for a column of numbers.
+    /// Returns the names for which the codes of a column stand; `None` for a column of numbers.
     fn categories(&self, name: &str) -> PyResult<Option<Vec<String>>> {
         let array = self.find(name)?;
         let strings = matches!(array.data_type(), DataType::Dictionary(_, _)).then(|| array.as_dictionary::<Int32Type>().values());
         Ok(strings.map(|strings| strings.as_string::<i32>().iter().map(|name| name.unwrap_or_default().to_owned()).collect()))
     }
 
-    /// Where the numbers of a column are.
+    /// Returns the address of the numbers of a column.
     fn address(&self, name: &str) -> PyResult<usize> {
         let data = self.find(name)?.to_data();
         Ok(data.buffers().first().map_or(0, |buffer| buffer.as_ptr().addr()))
     }
 
-    /// The schema, by the Arrow PyCapsule protocol.
+    /// Returns the schema, by the Arrow PyCapsule protocol.
     #[pyo3(signature = () -> "typing.Any")]
     fn __arrow_c_schema__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
         let schema = FFI_ArrowSchema::try_from(self.batch.schema().as_ref()).map_err(|error| of_value(&error))?;
         PyCapsule::new_with_value(py, schema, c"arrow_schema")
     }
 
-    /// The rows, by the Arrow PyCapsule protocol.
+    /// Returns the rows, by the Arrow PyCapsule protocol.
     #[pyo3(signature = (requested_schema: "typing.Any | None" = None) -> "typing.Any")]
     fn __arrow_c_stream__<'py>(&self, py: Python<'py>, requested_schema: Option<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyCapsule>> {
         // A producer may leave a requested schema unheeded.
