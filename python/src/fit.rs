@@ -124,9 +124,7 @@ impl Delays {
             Err(error @ FitFailure::LongDelays { .. }) => {
                 Err(of_fault(py, &format!("{error} offset and least are for clocks that are; with offset=0.0 the delays are taken as they are")))
             }
-            Err(error @ (FitFailure::Measurements(_) | FitFailure::Fit(_) | FitFailure::Unheld(_))) => {
-                Err(of_fault(py, &error.to_string()))
-            }
+            Err(error @ (FitFailure::Measurements(_) | FitFailure::Fit(_) | FitFailure::Unheld(_))) => Err(of_fault(py, &error.to_string())),
         }
     }
 }

@@ -177,7 +177,8 @@ impl Link {
         }
         let no_time = |_| PyValueError::new_err(format!("{every} s is not a time between packets: expected seconds, from 0 on"));
         let every = Duration::try_from_secs_f64(every).map_err(no_time)?;
-        let stream = SteadyStream { packets, every, info: PacketInfo { size: Bytes::new(size), ecn: if ecn { Ecn::Capable0 } else { Ecn::NotCapable } } };
+        let stream =
+            SteadyStream { packets, every, info: PacketInfo { size: Bytes::new(size), ecn: if ecn { Ecn::Capable0 } else { Ecn::NotCapable } } };
         if let Some(why) = too_long(&stream) {
             return Err(PyValueError::new_err(why));
         }
