@@ -1,4 +1,4 @@
-"""A peer with a socket and a clock."""
+"""Peer with a socket and a clock."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from .core import HELLO_EVERY_NS, Mechanics, Peer
 from .datagrams import Joining, Session
 
 BUFFER_LEN = 2048
-"""Longer than any datagram of the protocol, so that a longer one is not cut to a valid one [byte]."""
+"""Size of the receive buffer [bytes]: longer than any datagram of the protocol, so that a longer datagram is not cut to a valid one."""
 
 
 @final
 class Client:
-    """A peer that has joined a session. A context manager, which closes the socket."""
+    """Peer that has joined a session. As a context manager, the client closes its socket at the end."""
 
     def __init__(
         self,
@@ -71,12 +71,12 @@ class Client:
         )
 
     def send(self, datagram: bytes) -> None:
-        """Sends a datagram. One that cannot be sent is lost: the next sample says more."""
+        """Sends a datagram. A datagram that cannot be sent is lost, because the next sample is newer anyway."""
         with contextlib.suppress(OSError):
             self._door.send(datagram)
 
     def receive(self) -> bytes | None:
-        """Returns a datagram that has arrived, if there is one."""
+        """Returns a datagram that has arrived, or ``None``."""
         for _ in range(8):
             try:
                 return self._door.recv(BUFFER_LEN)
@@ -87,13 +87,13 @@ class Client:
         return None
 
     def wait_for(self, k: int, began: int) -> None:
-        """Waits until tick ``k`` of a loop that began at ``began`` [ns]. A late tick is made at once, so that the peer's time never falls behind for good."""
+        """Waits until tick ``k`` of a loop that began at ``began`` [ns]. A late tick is made at once, so that the peer catches up with the clock."""
         left = began + k * self.peer.session.tick_ns - time.monotonic_ns()
         if left > 0:
             time.sleep(left / 1e9)
 
     def exchange(self, k: int) -> int:
-        """Makes steps 1 and 2 of tick ``k``: sends, takes in what has arrived, begins anew after silence. Returns the time [ns]."""
+        """Makes steps 1 and 2 of tick ``k``: sends a sample, takes in the arrived datagrams, and begins anew after silence. Returns the time [ns]."""
         now = time.monotonic_ns()
         if (due := self.peer.sample(k)) is not None:
             self.send(due)
@@ -108,7 +108,7 @@ class Client:
 
 
 def _connected(text: str) -> socket.socket:
-    """Returns a socket that talks to the session alone: the system drops what comes from elsewhere."""
+    """Returns a socket that is connected to the session. The system drops datagrams from other addresses."""
     host, colon, port = text.rpartition(":")
     if not colon or not port.isdecimal():
         raise ValueError(f"{text} is no HOST:PORT")

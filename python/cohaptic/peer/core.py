@@ -1,4 +1,4 @@
-"""A peer without socket and clock: its copy of the object, the coupling to its device, and the samples held from the others."""
+"""Peer without socket and clock: copy of the object, coupling to the device, and samples held of the other peers."""
 
 from __future__ import annotations
 
@@ -11,34 +11,34 @@ from .datagrams import Joining, Sample, Session, decode, encode, is_notice
 from .mechanics import Attitude, Body, Matrix, State, Turn, Vector, apply, cross, transposed
 
 SILENCE_NS = 1_000_000_000
-"""Time without anything new from anybody after which the peer begins anew."""
+"""Time without a new sample of any peer, after which the peer begins anew [ns]."""
 HELLO_EVERY_NS = 250_000_000
 
 
 @dataclass(frozen=True)
 class Mechanics:
-    """Keys of the scene that a peer needs. The values must be those of the scene that the session runs."""
+    """Keys of the scene that a peer needs. The values must equal the values in the scene of the session."""
 
     coupling: tuple[float, float] = (3500.0, 5.0)
-    """KC [N/m] and BC [N·s/m]."""
+    """Stiffness KC [N/m] and damping BC [N·s/m] of the coupling."""
     coordination: tuple[float, float] = (300.0, 5.0)
-    """KT [N/m] and BT [N·s/m]."""
+    """Stiffness KT [N/m] and damping BT [N·s/m] of the coordination."""
     law: Literal["AP", "PD"] = "AP"
-    """Average-position or proportional-derivative coordination."""
+    """Coordination law: average-position (AP) or proportional-derivative (PD)."""
     object_mass: float = 0.45
     """Mass of the whole object [kg]; each copy has its share."""
     object_damping: float = 0.0
     """Damping of each copy [N·s/m]."""
     inertia: Vector | None = None
-    """Inertia of the whole object about its axes [kg·m²], if it turns."""
+    """Inertia of the whole object about its axes [kg·m²]; ``None`` for an object that does not turn."""
     grasp: Vector = (0.0, 0.0, 0.0)
-    """Point of an object that turns at which the device holds it, in its axes [m]."""
+    """Point at which the device holds an object that turns, in the axes of the object [m]."""
     start: Vector = (0.0, 0.0, 0.0)
-    """Where the copies begin [m]."""
+    """Position of the copies at the beginning [m]."""
     exchange_every: int = 1
-    """E: the device is read and pushed at each E-th tick."""
+    """Number of ticks from one exchange to the next: the device is read and pushed at exchanges only."""
     exchange_age: Literal[0, 1] = 0
-    """1 if the force comes from the reading of the exchange before."""
+    """1 if the force is computed from the reading of the previous exchange, otherwise 0."""
 
     def __post_init__(self) -> None:
         if not self.object_mass > 0 or self.exchange_every < 1 or self.exchange_age not in (0, 1):
@@ -49,7 +49,7 @@ class Mechanics:
 
 @dataclass
 class Other:
-    """What is held from another peer: the sample with the highest number, the initial state before the first."""
+    """State held of another peer: the sample with the highest number, or the initial state before the first sample."""
 
     states: list[State]
     matrix: Matrix = field(default_factory=lambda: Attitude().matrix())
@@ -60,7 +60,7 @@ class Other:
     late: int = 0
 
     def take(self, sample: Sample, now: int) -> bool:
-        """Takes a sample. Returns whether it is newer than the one that was held."""
+        """Takes a sample. Returns whether the sample is newer than the held sample."""
         self.received += 1
         if self.newest is not None and sample.number <= self.newest:
             self.late += 1
@@ -73,7 +73,7 @@ class Other:
 
 
 class Peer:
-    """A peer of a session: what it does at a tick, in the order of docs/live-protocol.md.
+    """Peer of a session, with the steps of a tick in the order of docs/live-protocol.md.
 
     Times are in ns on a clock that never goes back.
     """
@@ -99,9 +99,9 @@ class Peer:
             self.turn = Turn([moment / session.peers for moment in mechanics.inertia], damping, step)
             start = [(x + arm, v) for (x, v), arm in zip(start, mechanics.grasp, strict=True)]
         self.reading, self.read_before = start, start
-        """r of docs/model.md, and the state that was read at the latest exchange."""
+        """State from which forces are computed (r of docs/model.md), and the state read at the latest exchange."""
         self.weight = 1.0
-        """Share of FC that is in force, 0 to 1."""
+        """Weight of the coupling force FC, from 0 to 1."""
         self.on_hand = [0.0] * session.axes
         """Force on the device until the next exchange [N]."""
         self.sent = self.ignored = self.taken = 0
@@ -111,7 +111,7 @@ class Peer:
         self._next_hello = 0
 
     def sample(self, k: int) -> bytes | None:
-        """Returns the datagram that is due at tick ``k``, if one is due."""
+        """Returns the datagram that is due at tick ``k``, or ``None`` if no datagram is due."""
         if k % self.ticks_per_update:
             return None
         attitude = self.turn.attitude if self.turn else None
@@ -121,7 +121,7 @@ class Peer:
         return self.joining.seal(plain) if self.joining else plain
 
     def take(self, datagram: bytes, now: int) -> bool:
-        """Takes in a datagram. Returns whether it is one that this peer may believe."""
+        """Takes in a datagram. Returns whether the datagram is a valid sample or answer for this peer."""
         if self._rejoining and (told := self._rejoining.handle_welcome(datagram)):
             if told != self.session:
                 raise ConnectionError("the session was started again with another scene")
@@ -142,13 +142,13 @@ class Peer:
         return True
 
     def is_in_silence(self, now: int) -> bool:
-        """Returns whether nothing new was heard for a second. A scene of one peer has nobody to hear."""
+        """Returns whether no new sample came for a second. A scene of one peer is never silent, because there is nobody to hear."""
         return bool(self.others) and now - self.heard_at >= SILENCE_NS
 
     def begin_anew(self, now: int) -> bytes | None:
         """Begins anew after silence, and returns a hello if one is due.
 
-        The session may have been started again: its numbers begin at 0 then, and the keys of the joining are worth nothing.
+        The session may have been started again. Its numbers then begin at 0, and the keys of the joining are no longer valid.
         """
         if not self.is_in_silence(now):
             self._rejoining = None
@@ -221,13 +221,13 @@ class Peer:
             other.newest = None
 
     def check(self) -> None:
-        """Raises if the copy has diverged."""
+        """Raises an exception if the copy has diverged."""
         if not self.copy.is_finite:
             raise ArithmeticError("the copy has diverged: the scene is unstable with this device")
 
 
 def grew(weight: float, wanted: bool, step: float) -> float:
-    """Returns the weight of a pull one step later: it comes and goes linearly."""
+    """Returns the weight of a pull one step later. The weight rises and falls linearly."""
     return min(1.0, weight + step) if wanted else max(0.0, weight - step)
 
 

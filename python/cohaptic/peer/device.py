@@ -35,61 +35,62 @@ from .mechanics import State, Vector
 
 
 class Reading(NamedTuple):
-    """What a device says of its grip. x points to the right of the person, y up, z to the person; the origin is in the middle."""
+    """Reading of a device: motion of the grip. x points to the right of the person, y up, z to the person. The origin is in the middle of the workspace."""
 
     position: Sequence[float]
-    """Three numbers [m]."""
+    """Position of the grip, three numbers [m]."""
     velocity: Sequence[float]
-    """Three numbers [m/s]."""
+    """Velocity of the grip, three numbers [m/s]."""
     ready: bool = True
-    """Whether the device is calibrated and powered. Otherwise position and velocity mean nothing."""
+    """``True`` if the device is calibrated and powered. Otherwise position and velocity are ignored."""
     armed: bool = True
-    """Whether the person has switched forces on. Otherwise the hand feels and moves nothing."""
+    """``True`` if the person has switched forces on. Otherwise the hand feels and moves nothing."""
 
 
 class Device(Protocol):
-    """What a device has. Nothing has to inherit from it.
+    """Methods of a device. A device need not inherit from this class.
 
     ``read`` and ``push`` are called at each exchange, a thousand times a second in most scenes, and must not block: input and output belong to a thread
     of the device.
     """
 
     def read(self) -> Reading | None:
-        """The newest reading. ``None`` if there is none: the one before then grows old."""
+        """Returns the newest reading, or ``None`` without a new one. The age of the previous reading then grows."""
         ...
 
     def push(self, force: Sequence[float]) -> Any:
-        """Takes the force on the hand [N], three numbers, which has passed the gate. Zero when nothing may be felt."""
+        """Takes the force on the hand [N], three numbers. The force has passed the gate, and is zero if the hand may feel nothing."""
         ...
 
     def stop(self) -> Any:
-        """Switches all forces off, for good: ``push`` must do nothing afterwards.
+        """Switches all forces off for good. Later calls of ``push`` must do nothing.
 
-        Called at every end of :func:`join`: its time, a signal, an exception, the end of the interpreter. May be called twice and from any thread.
+        Called at every end of :func:`join`: after its duration, a signal or an exception, and at the end of the interpreter. May be called twice and from
+        any thread.
         """
         ...
 
 
 @dataclass(frozen=True)
 class Joined:
-    """What happened while a device took part."""
+    """Report of a device that took part in a session."""
 
     ended: str
-    """``time``, ``stop`` for the event of the caller, or the name of the signal."""
+    """Cause of the end: ``time``, ``stop`` for the event of the caller, or the name of a signal."""
     ticks: int
-    """Ticks of the peer."""
+    """Number of ticks of the peer."""
     sent: int
-    """Samples sent."""
+    """Number of samples sent."""
     ignored: int
-    """Datagrams that were nothing this peer may believe."""
+    """Number of datagrams that were no valid sample or answer for this peer."""
     joinings: int
-    """Handshakes that succeeded; 0 without a key."""
+    """Number of successful handshakes; 0 without a key."""
     pushes: dict[str, int]
-    """How often the device was pushed, by the cause of zero force; ``force`` counts those that passed."""
+    """Number of pushes of the device, by the cause of a zero force. ``force`` counts the forces that passed the gate."""
     position: list[float]
-    """Where the copy is at the end [m]."""
+    """Position of the copy at the end [m], a number for each axis."""
     velocity: list[float]
-    """How fast the copy is at the end [m/s]."""
+    """Velocity of the copy at the end [m/s], a number for each axis."""
     received: dict[int, int]
     """Samples received from each other place."""
     taken: int
@@ -125,19 +126,19 @@ def join(
     label: str = "",
     until: threading.Event | None = None,
 ) -> Joined:
-    """Holds a device in a live session at ``door``, HOST:PORT, and returns what happened.
+    """Holds a device in a live session at ``door``, HOST:PORT, and returns a report at the end.
 
-    ``session`` is the seed of the scene and ``place`` the place of the peer among its peers, from 0. With ``key_file`` the session tells ``peers``,
-    ``axes``, ``tick`` and ``update`` [s]; without one the caller does. ``coupling`` is KC and BC, ``coordination`` KT and BT [N/m, N·s/m]. These,
-    ``law``, the keys of the object, ``exchange_every`` and ``exchange_age`` must be those of the scene. With a key the session also hears ``fingerprint``,
-    which it compares with its own (0: unknown), and ``label``, at most 8 printable ASCII characters, which it shows.
+    ``session`` is the seed of the scene, and ``place`` the index of the peer in the scene, from 0. With ``key_file`` the session tells ``peers``, ``axes``,
+    ``tick`` and ``update`` [s]; without a key the caller gives these. ``coupling`` is KC and BC, ``coordination`` is KT and BT [N/m, N·s/m]. ``coupling``,
+    ``coordination``, ``law``, the keys of the object, ``exchange_every`` and ``exchange_age`` must have the values of the scene. With a key the session also
+    gets ``fingerprint`` and ``label``. It compares the fingerprint with its own (0: unknown). It shows the label, at most 8 printable ASCII characters.
 
-    Each force passes a gate: at most ``force_limit`` [N], changed by at most 1000 N/s, and zero at once while the device is not ready, not armed or not
-    read, while nobody is heard, and after a pause of the loop above 20 ms. A device that cannot be read lets go of the copy, and takes hold again, within
-    ``fade`` [s].
+    Each force passes a gate. The gate limits the force to ``force_limit`` [N], and its change to 1000 N/s. The gate makes the force zero at once if the
+    device is not ready, not armed or not read, if nobody is heard, and after a pause of the loop above 20 ms. If the device cannot be read, the pull of the
+    device on the copy fades within ``fade`` [s], and rises again within ``fade`` when the device is back.
 
-    Ends after ``duration`` [s], when the event ``until`` is set (from any thread, as often as one likes), or with SIGINT or SIGTERM if called in the main
-    thread. Exceptions of the device end it too. ``stop`` of the device is called in each case.
+    The call ends after ``duration`` [s], when the event ``until`` is set (from any thread), or with SIGINT or SIGTERM if called in the main thread. An
+    exception of the device ends the call too. ``stop`` of the device is called in each case.
 
     :raises TimeoutError: nobody answered within ``patience`` [s]
     :raises ValueError: parameters that do not fit together
@@ -195,12 +196,12 @@ def join(
 
 
 class _Loop:
-    """The ticks of a peer with a device. The thread of the caller runs all of them."""
+    """Loop over the ticks of a peer with a device, on the thread of the caller."""
 
     def __init__(self, device: Device, client: Client, gate: Gate, fade: float) -> None:
         self.device, self.client, self.gate = device, client, gate
         self.k = 0
-        """The next tick."""
+        """Number of the next tick."""
         self.began = time.monotonic_ns()
         self.per_tick = client.peer.session.tick_ns / (fade * 1e9) if fade > 0 else 1.0
         self.ready = self.armed = False
@@ -209,7 +210,7 @@ class _Loop:
         client.peer.weight = 0.0
 
     def tick(self) -> None:
-        """Waits for the next tick and makes it."""
+        """Waits for the next tick, and makes the tick."""
         peer, k = self.client.peer, self.k
         self.client.wait_for(k, self.began)
         self.client.exchange(k)
@@ -230,7 +231,7 @@ class _Loop:
         peer.check()
 
     def _read(self, now: int) -> list[State] | None:
-        """Reads the device. Returns its states along the axes of the session, or ``None`` if they cannot be used."""
+        """Reads the device. Returns its states along the axes of the session, or ``None`` if the states cannot be used."""
         reading = self.device.read()
         if reading is None:
             return None
@@ -247,7 +248,7 @@ class _Loop:
 
 @final
 class _End:
-    """Every end of a loop: time, event, signal, exception, and the end of the interpreter. The device is stopped in each case."""
+    """Ends of a loop: duration, event, signal, exception, and the end of the interpreter. The device is stopped in each case."""
 
     def __init__(self, device: Device, until: threading.Event) -> None:
         self.device, self.until = device, until
