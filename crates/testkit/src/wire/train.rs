@@ -6,14 +6,14 @@ use cohaptic_wan::Path;
 
 use super::{HasFlow, Held, Parcel, Wire};
 
-/// Segments that travel with the segment of a parcel, in the order of sending. Together with that segment they are a train. All have the parcel's addresses.
+/// Segments that travel with the segment of a parcel, in the order of sending: together they are a train. All have the addresses of the parcel.
 ///
 /// The list has the segments themselves, one after the other in memory. A parcel for each segment would take an allocation and three times the memory.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Followers {
-    /// Segments of the train, followed by former segments without data. Further segments are written over the former segments.
+    /// The segments, and after them former segments without data, over which further segments are written.
     segments: Vec<Segment<'static>>,
-    /// Number of segments of the train: the first entries of `segments`.
+    /// Number of segments.
     count: usize,
     /// Bytes that [`Held`] counts for the packets of the segments on a link.
     cost: u64,
@@ -51,7 +51,7 @@ impl Followers {
         }
     }
 
-    /// Returns whether the list is so short that its memory is kept. The memory of a long burst is not kept for the rest of the run.
+    /// Returns whether the memory of the list is worth keeping: a burst must not occupy memory for the rest of the run.
     pub(crate) const fn is_short(&self) -> bool {
         self.segments.capacity() <= Self::SHORT
     }
@@ -72,7 +72,7 @@ impl Followers {
     }
 
     pub(crate) fn clear(&mut self) {
-        // A payload shares the memory of its sender's buffer. An empty payload releases this memory.
+        // The memory of the writer is not kept.
         self.iter_mut().for_each(|segment| segment.payload = Payload::default());
         (self.count, self.cost) = (0, 0);
     }
