@@ -56,7 +56,7 @@ pub(crate) struct JoiningKeys {
 }
 
 impl JoiningKeys {
-    /// Returns the keys of the joining of `place` with the two nonces.
+    /// Returns the keys of a joining at the seat of the peer at `place`, with the two nonces.
     pub(crate) fn derive(key: &SessionKey, session: u64, place: Place, client_nonce: Nonce, server_nonce: Nonce) -> Self {
         let way = |label| WayKey::derive(label, key, session, place, &client_nonce, &server_nonce);
         Self { to_door: way(TO_DOOR), to_peer: way(TO_PEER), client_nonce }

@@ -56,7 +56,7 @@ impl GroupCode {
 impl PersonCode {
     /// Returns the group and the seat of the person. `size`: number of people in a group, above 0.
     #[must_use]
-    pub const fn place(self, size: usize) -> (GroupCode, usize) {
+    pub const fn group_and_seat(self, size: usize) -> (GroupCode, usize) {
         let index = self.0.get() - 1;
         (GroupCode::of_index(index / size), index % size)
     }
@@ -146,7 +146,7 @@ mod tests {
             assert_eq!(trial.to_string().parse(), Ok(trial));
             for seat in 0..3 {
                 let person = group.person(seat, 3);
-                assert_eq!((person.place(3), person.to_string().parse()), ((group, seat), Ok(person)));
+                assert_eq!((person.group_and_seat(3), person.to_string().parse()), ((group, seat), Ok(person)));
             }
         }
         assert_eq!(GroupCode::of_index(3).person(0, 2).to_string(), "P07");

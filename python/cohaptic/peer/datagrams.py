@@ -100,7 +100,7 @@ def decode(session: Session, datagram: bytes) -> Sample | None:
 
 
 def is_notice(session: Session, joining: Joining | None, datagram: bytes) -> bool:
-    """Returns whether the session says that another program has the place of this peer. ``joining`` is that of the peer in a session with a key."""
+    """Returns whether the session says that another program has the seat of this peer. ``joining`` is that of the peer in a session with a key."""
     notice = NOTICE.pack(b"CHPS", 1, 0, session.number, session.place, 0) + (joining.nonce if joining else b"")
     # Samples differ here, and cost no tag.
     if not datagram.startswith(notice):
@@ -123,7 +123,7 @@ class Joining:
         return Joining(self.key, self.session, self.fingerprint, self.label)
 
     def hello(self) -> bytes:
-        """Returns the datagram that asks for the place."""
+        """Returns the datagram that asks for the seat."""
         session = self.session
         hello = HELLO.pack(
             b"CHPH", 1, 0, session.number, session.place, 0, self.nonce, self.fingerprint, self.label.encode()

@@ -92,9 +92,9 @@ class Joined:
     velocity: list[float]
     """Velocity of the copy at the end [m/s], a number for each axis."""
     received: dict[int, int]
-    """Samples received from each other place."""
+    """Samples received from each other peer, by its place."""
     taken: int
-    """Notices that another program has the place. The session sends one for each sample that it refuses for this reason."""
+    """Notices that another program has the seat. The session sends one for each sample that it refuses for this reason."""
 
 
 def join(

@@ -35,11 +35,11 @@ impl Joined<'_> {
         !status.is_seat_taken && (status.age.is_some() || is_settled)
     }
 
-    /// Returns the sentence about a seat of another program.
+    /// Returns the sentence that another program has the seat of this peer.
     pub(super) fn taken(&self) -> String {
         let Self { scene, place, session, .. } = self;
         let name = &scene.peers[*place].name;
-        format!("the seat of {name} at place {place} is taken: another program is {name} in the session at {session}")
+        format!("the seat of {name} is taken: another program has joined the session at {session} as {name}")
     }
 
     /// Returns what a user can do about a taken seat.
@@ -78,7 +78,7 @@ impl Joined<'_> {
             );
         }
         let everywhere = format!("no session listens there, or a firewall on the way drops UDP; its number, the seed of its scene, is not {seed}");
-        let seat = format!("its peer at place {place} is not of kind \"udp\", or has another computer ({name} here)");
+        let seat = format!("its peer at place {place} ({name} here) is not of kind \"udp\", or another program has the seat of that peer");
         if self.is_keyed {
             format!(
                 "no welcome from {session} yet. Possible reasons: {everywhere}; it has no key, or another one than --key-file; {seat}; its scene is \

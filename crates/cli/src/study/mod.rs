@@ -149,7 +149,7 @@ fn verified_words(verified: &Verified) -> String {
 fn forget(arguments: &StudyForgetArguments) -> Result<ExitCode, Failure> {
     let mut folder = open(&arguments.folder)?;
     folder.forget(arguments.person).map_err(failure)?;
-    let (group, _) = arguments.person.place(folder.study().group_size());
+    let (group, _) = arguments.person.group_and_seat(folder.study().group_size());
     let words = format!(
         "{} is forgotten: the trials of {group} are removed, because nobody moved alone in them, and the answers of {}. The row of {group} is given again\n",
         arguments.person, arguments.person

@@ -146,7 +146,7 @@ fn a_second_join_is_told(key: &str) {
         join
     };
     let first = takes_part();
-    let taken = format!("the seat of left at place 0 is taken: another program is left in the session at {address}");
+    let taken = format!("the seat of left is taken: another program has joined the session at {address} as left");
     let way_out = "End that program, whose address the session's report and page show, or join another session";
     let second = desk.cohaptic(&line);
     second.assert_refused(3, &[&format!("{taken}, for 5s now. {way_out}")]);

@@ -110,7 +110,7 @@ function showLeft() {
 let refused = null;
 function onTrouble(text, looksOn) {
   if (LAST.includes(now.page)) return;
-  // Another window has the address. The server frees the place when that window is closed.
+  // Another window has the address. The server frees the seat when that window is closed.
   refused = looksOn && text ? text : refused;
   if (looksOn && text) setTimeout(() => socket.close(), 1000);
   else if (text === null) refused = null;

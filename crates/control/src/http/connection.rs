@@ -17,7 +17,7 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpListener, TcpStream};
 
 use super::patient::Patient;
-use super::places::{Limits, Places, Seat};
+use super::slots::{Limits, Slot, Slots};
 
 /// Time for the head of a request, counted from the connection or from the answer before, and time that an answer waits for a slow reader.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(10);
@@ -33,11 +33,11 @@ pub(crate) async fn answer_all(listener: TcpListener, router: Router) {
 
 /// Accepts connections forever, with given limits.
 async fn answer_within(listener: TcpListener, router: Router, limits: Limits, patience: Duration) {
-    let places = Places::new(limits);
+    let slots = Slots::new(limits);
     loop {
         match listener.accept().await {
             Ok((stream, address)) => {
-                tokio::spawn(answer(stream, router.clone(), places.take(address.ip()), patience));
+                tokio::spawn(answer(stream, router.clone(), slots.take(address.ip()), patience));
                 // Lets a connection with a complete request show its token before the next connection may displace the stranger.
                 tokio::task::yield_now().await;
             }
@@ -45,7 +45,7 @@ async fn answer_within(listener: TcpListener, router: Router, limits: Limits, pa
             Err(error) if matches!(error.kind(), io::ErrorKind::ConnectionAborted | io::ErrorKind::ConnectionReset) => {}
             Err(_) => {
                 // The likely error is too many open files. Ending a stranger's connection frees one.
-                places.send_one_away();
+                slots.send_one_away();
                 tokio::time::sleep(RETRY).await;
             }
         }
@@ -53,16 +53,16 @@ async fn answer_within(listener: TcpListener, router: Router, limits: Limits, pa
 }
 
 /// Answers the requests of a TCP connection until its end.
-async fn answer(stream: TcpStream, router: Router, seat: Arc<Seat>, patience: Duration) {
+async fn answer(stream: TcpStream, router: Router, slot: Arc<Slot>, patience: Duration) {
     // Without a delay for coalescing, because events are small and should be seen at once.
     let _set: io::Result<()> = stream.set_nodelay(true);
-    converse(stream, router, seat, patience).await;
+    converse(stream, router, slot, patience).await;
 }
 
 /// Answers the requests of a stream until its end, or until the connection loses its place.
-async fn converse(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, router: Router, seat: Arc<Seat>, patience: Duration) {
+async fn converse(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, router: Router, slot: Arc<Slot>, patience: Duration) {
     let routes = TowerToHyperService::new(router);
-    let shown = Arc::clone(&seat);
+    let shown = Arc::clone(&slot);
     let service = service_fn(move |mut request: Request<Incoming>| {
         // The guard finds the connection's place in the request, to record the role shown.
         request.extensions_mut().insert(Arc::clone(&shown));
@@ -72,14 +72,14 @@ async fn converse(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, 
     builder.timer(TokioTimer::new()).header_read_timeout(patience).max_buf_size(BUFFER);
     let serving = builder.serve_connection(TokioIo::new(Patient::new(stream, patience)), service).with_upgrades();
     // The result is ignored: on an error the other end is gone, does not speak HTTP, or is too slow, and nobody could be told.
-    select(pin!(serving), pin!(seat.sent_away())).await;
+    select(pin!(serving), pin!(slot.sent_away())).await;
 }
 
 /// Answers the requests of a stream as if from this machine, on a server without other connections.
 #[cfg(fuzzing)]
 pub(crate) async fn answer_bytes(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, router: Router) {
-    let seat = Places::new(Limits::USUAL).take(std::net::Ipv4Addr::LOCALHOST.into());
-    converse(stream, router, seat, PATIENCE).await;
+    let slot = Slots::new(Limits::USUAL).take(std::net::Ipv4Addr::LOCALHOST.into());
+    converse(stream, router, slot, PATIENCE).await;
 }
 
 #[cfg(test)]
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stranger_has_one_answer_and_the_host_has_places_of_its_own() {
+    fn a_stranger_has_one_answer_and_the_host_has_slots_of_its_own() {
         let address = server();
         let refused = rest(send(address, "GET /api/state HTTP/1.1\r\nHost: localhost\r\n\r\n"));
         assert!(refused.starts_with("HTTP/1.1 401 ") && refused.to_lowercase().contains("connection: close"), "{refused}");

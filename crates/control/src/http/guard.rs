@@ -8,7 +8,7 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, he
 use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Redirect, Response};
 
-use super::places::Seat;
+use super::slots::Slot;
 use super::{App, People, Refusal, page};
 use crate::Role;
 
@@ -26,11 +26,11 @@ const HEADERS: [(HeaderName, &str); 7] = [
 /// Passes a request to its route, or refuses the request.
 pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let mut request = request;
-    let seat = request.extensions().get::<Arc<Seat>>().cloned();
+    let slot = request.extensions().get::<Arc<Slot>>().cloned();
     // The host is checked before the token: a page of another site must not learn whether a token is right.
     let known = check_host(&app, request.uri(), request.headers());
     let shown = known.and_then(|()| check_token(&app, request.uri(), request.headers()));
-    let admitted = shown.and_then(|shown| sit(seat.as_deref(), shown));
+    let admitted = shown.and_then(|shown| take_slot(slot.as_deref(), shown));
     // Only guests wait for their turn, so guests cannot delay the host.
     if matches!(admitted, Ok(Visitor::Guest(_))) {
         app.pace.turn().await;
@@ -58,8 +58,8 @@ pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: N
     if answer.status() == StatusCode::UNAUTHORIZED {
         answer.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
     }
-    // Connections without a token have few places. Closing after each answer frees the place.
-    if seat.is_some_and(|seat| seat.is_strange()) {
+    // Connections without a token have few slots. Closing after each answer frees the slot.
+    if slot.is_some_and(|slot| slot.is_strange()) {
         answer.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
     }
     for (name, value) in HEADERS {
@@ -68,9 +68,9 @@ pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: N
     answer
 }
 
-/// Counts the connection among the connections of `role`, or refuses if all places of the role are taken.
-fn sit(seat: Option<&Seat>, visitor: Visitor) -> Result<Visitor, Refusal> {
-    if seat.is_some_and(|seat| !seat.show(visitor.role())) {
+/// Counts the connection among the connections of `role`, or refuses if all slots of the role are taken.
+fn take_slot(slot: Option<&Slot>, visitor: Visitor) -> Result<Visitor, Refusal> {
+    if slot.is_some_and(|slot| !slot.show(visitor.role())) {
         return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "too many connections are open with this token: close some, or try again later"));
     }
     Ok(visitor)

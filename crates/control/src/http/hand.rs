@@ -21,8 +21,8 @@ use tokio_tungstenite::tungstenite::{Error, Message};
 
 use super::frames::Counted;
 use super::guard::{Visitor, check_token};
-use super::places::Seat;
 use super::round_trips::RoundTrips;
+use super::slots::Slot;
 use super::{App, People, Refusal};
 use crate::{Guests, Hands, Token};
 
@@ -65,7 +65,7 @@ pub(super) async fn connect(
     if check_token(&app, request.uri(), request.headers())? != visitor {
         return Err(Refusal::new(StatusCode::CONFLICT, "the tokens of the guests have changed meanwhile: ask again"));
     }
-    let seat = request.extensions().get::<Arc<Seat>>().cloned();
+    let slot = request.extensions().get::<Arc<Slot>>().cloned();
     // The answer is made first, so that a request without a WebSocket takes no hand.
     let answer = create_response_with_body(&request, Body::empty)
         .map_err(|error| Refusal::new(StatusCode::UPGRADE_REQUIRED, format!("expected a WebSocket: {error}")))?;
@@ -76,7 +76,7 @@ pub(super) async fn connect(
         Wanted::One(hand) => hands.take_hand(Some(hand)).map(Some),
     };
     // The upgrade completes after the answer has been sent, so the conversation waits on a task of its own.
-    tokio::spawn(talk(hands, hand, pass, upgrade, seat));
+    tokio::spawn(talk(hands, hand, pass, upgrade, slot));
     Ok(answer.into_response())
 }
 
@@ -160,8 +160,8 @@ fn limits() -> WebSocketConfig {
     WebSocketConfig::default().max_message_size(Some(LONGEST)).max_frame_size(Some(LONGEST)).read_buffer_size(READ_AT_ONCE)
 }
 
-/// Serves the WebSocket of a page until its end. Holds `seat`, the place of the connection, as long.
-async fn talk(hands: Arc<dyn Hands>, hand: Result<Option<usize>, String>, pass: Pass, upgrade: OnUpgrade, seat: Option<Arc<Seat>>) {
+/// Serves the WebSocket of a page until its end. Holds the slot of the connection until then.
+async fn talk(hands: Arc<dyn Hands>, hand: Result<Option<usize>, String>, pass: Pass, upgrade: OnUpgrade, slot: Option<Arc<Slot>>) {
     // A refused hand is told to the page, which may still watch.
     let greeting = match &hand {
         Ok(hand) => json!({ "hand": hand }),
@@ -177,7 +177,7 @@ async fn talk(hands: Arc<dyn Hands>, hand: Result<Option<usize>, String>, pass: 
         select(pin!(listen(&taken, incoming)), pin!(show(&*hands, &taken, &pass, out))).await;
     }
     // The hand and the place are free only after the end of both directions.
-    drop((taken, seat));
+    drop((taken, slot));
 }
 
 /// Moves the hand by the messages of a page, and passes on other words, until the page goes or sends a message no page sends.

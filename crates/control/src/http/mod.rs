@@ -10,11 +10,11 @@ pub(crate) mod hand;
 mod pace;
 mod page;
 mod patient;
-mod places;
 mod play;
 mod read;
 mod round_trips;
 mod shown;
+mod slots;
 mod study;
 #[cfg(test)]
 mod tests;

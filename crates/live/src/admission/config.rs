@@ -8,7 +8,7 @@ use cohaptic_units::print::{Counted, Span};
 use crate::place::Place;
 use crate::{EntropyError, SessionKey};
 
-/// Peer of the scene that is another program.
+/// Seat of a session: the peer of the scene that a program joins as. One program at a time has the seat.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Seat {
     /// Index of the peer in the scene.
@@ -42,7 +42,7 @@ pub struct AdmissionConfig {
     pub peers: u32,
     /// Period of sending Tn, above zero and below 584 years. A welcome carries this period.
     pub update: Duration,
-    /// Peers that are other programs, in any order, each at a place of its own.
+    /// Seats of the peers that are other programs, in any order, each at a place of its own.
     pub seats: Vec<Seat>,
     /// Session key. With a key only programs with the key can join. `None`: every program within reach of the socket can join.
     pub key: Option<SessionKey>,

@@ -45,7 +45,7 @@ pub struct SessionInfo {
     pub axes: usize,
     /// Number of peers of the scene, this peer included.
     pub peers: u32,
-    /// Control tick Tc of the client's place.
+    /// Control tick Tc of the client's peer.
     pub tick: Duration,
     /// Period of sending Tn.
     pub update: Duration,

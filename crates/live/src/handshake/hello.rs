@@ -6,7 +6,7 @@
 //!      4     2  version, 1
 //!      6     2  zero
 //!      8     8  session
-//!     16     4  place that the peer wants
+//!     16     4  place of the seat that the peer asks for
 //!     20     4  zero
 //!     24    16  nonce of the client
 //!     40     8  fingerprint of the scene, or zero

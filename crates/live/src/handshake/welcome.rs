@@ -7,11 +7,11 @@
 //!      6     1  axes, 1 to 3
 //!      7     1  1 if samples carry attitudes, else 0
 //!      8     8  session
-//!     16     4  place, as in the hello
+//!     16     4  place of the seat, as in the hello
 //!     20     4  number of peers of the scene
 //!     24    16  nonce of the client, as in the hello
 //!     40    16  nonce of the server
-//!     56     8  control tick of the place [ns]
+//!     56     8  control tick of the peer [ns]
 //!     64     8  period of sending [ns]
 //!     72    16  tag under the session key
 //! ```
@@ -41,7 +41,7 @@ pub struct Welcome {
     pub client_nonce: Nonce,
     /// Nonce of the server. The keys of the joining are derived from both nonces.
     pub server_nonce: Nonce,
-    /// Control tick Tc of the place, above zero. Encoded in whole nanoseconds, at most 2⁶⁴ − 1 (584 years).
+    /// Control tick Tc of the peer, above zero. Encoded in whole nanoseconds, at most 2⁶⁴ − 1 (584 years).
     pub tick: Duration,
     /// Period of sending Tn, above zero. Encoded in whole nanoseconds, at most 2⁶⁴ − 1 (584 years).
     pub update: Duration,

@@ -12,7 +12,7 @@ const MARGIN: Duration = Duration::from_secs(1);
 
 /// Error: another program has the seat of this peer, and keeps the seat.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("the seat at place {place} is taken: for {} the session has refused the samples from here, because another program is {name}", Span(*patience))]
+#[error("the seat of {name} is taken: for {} the session has refused the samples from here, because another program has the seat", Span(*patience))]
 pub struct SeatTaken {
     /// Index of the peer in the scene.
     pub place: usize,

@@ -480,7 +480,7 @@ fn a_peer_without_a_seat_learns_so_and_waits_for_a_vanished_holder() {
         if end == u64::MAX {
             assert!(gives_up.is_some_and(|millis| (2100..2130).contains(&millis)) && takes_part.is_none(), "{gives_up:?}, {takes_part:?}");
             let text = lefts[1].seat_taken().unwrap().to_string();
-            assert_eq!(text, "the seat at place 0 is taken: for 2s the session has refused the samples from here, because another program is left");
+            assert_eq!(text, "the seat of left is taken: for 2s the session has refused the samples from here, because another program has the seat");
         } else {
             // The last sample of the first program came before 1 s, so that its seat is free before 2 s, and a sample needs 24.5 ms.
             assert!(takes_part.is_some_and(|millis| (1990..2040).contains(&millis)) && gives_up.is_none(), "{takes_part:?}, {gives_up:?}");

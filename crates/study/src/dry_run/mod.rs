@@ -59,7 +59,7 @@ impl Study {
     #[must_use]
     pub fn person(&self, code: PersonCode) -> Person {
         // With groups of one, the index of the group is the index of the person, whatever the size of the groups.
-        let (group, _) = code.place(1);
+        let (group, _) = code.group_and_seat(1);
         let stream = Stream::new(self.seed, b"study person");
         let factor = |key: u8| {
             // Each property has draws of its own, so that the properties are independent over persons.

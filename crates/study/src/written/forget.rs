@@ -14,7 +14,7 @@ impl StudyFolder {
     ///
     /// [`StudyError::Nobody`] if no session has had a person with this code; otherwise [`StudyError::File`]. The same call then goes on.
     pub fn forget(&mut self, person: PersonCode) -> Result<(), StudyError> {
-        let (code, seat) = person.place(self.study().group_size());
+        let (code, seat) = person.group_and_seat(self.study().group_size());
         let Some(group) = self.groups().get(code.index()) else {
             return Err(StudyError::Nobody { path: self.path().to_path_buf(), person });
         };

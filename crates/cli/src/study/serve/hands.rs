@@ -46,7 +46,7 @@ impl Hand {
         }
     }
 
-    /// Takes the place of the person. Returns `false` if a page has the place.
+    /// Takes the seat of the person for a page. Returns `false` if another page has the seat.
     pub(super) fn connect(&self) -> bool {
         let is_free = !self.is_connected.swap(true, Ordering::Relaxed);
         if is_free {

@@ -39,7 +39,7 @@ impl Hands for Lab {
         self.hands[hand].disconnect();
         let mut state = lock(&self.state);
         state.people.set_ready(hand, false);
-        self.free_place(&mut state, hand);
+        self.free_seat(&mut state, hand);
         self.update(&mut state);
     }
 
@@ -130,7 +130,7 @@ impl StudyPages for Lab {
                 state.people.walk(person, word)?;
                 // The page of a person who refused is shown as long as it is open.
                 if !self.hands[person].is_connected() {
-                    self.free_place(&mut state, person);
+                    self.free_seat(&mut state, person);
                 }
                 self.update(&mut state);
                 Ok(())
@@ -186,8 +186,8 @@ impl Lab {
         })
     }
 
-    /// Gives the place of a person who refused another address, for another person.
-    fn free_place(&self, state: &mut State, seat: usize) {
+    /// Makes a new address for the seat of a person who refused, so that another person can come.
+    fn free_seat(&self, state: &mut State, seat: usize) {
         if state.people.way(seat) != Way::Refused {
             return;
         }

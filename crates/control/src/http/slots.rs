@@ -1,4 +1,4 @@
-//! Places of connections: limits the open connections of hosts, guests and strangers separately, so that neither guests nor strangers can keep the host out.
+//! Slots of connections: limits the open connections of hosts, guests and strangers separately, so that neither guests nor strangers can keep the host out.
 
 use core::net::{IpAddr, Ipv6Addr};
 use std::collections::{BTreeMap, VecDeque};
@@ -30,14 +30,14 @@ impl Limits {
     }
 }
 
-/// All places of a server, free and taken.
+/// All slots of a server, free and taken.
 #[derive(Debug)]
-pub(super) struct Places {
+pub(super) struct Slots {
     limits: Limits,
     taken: Mutex<Taken>,
 }
 
-/// Taken places. Each connection counts once: as a stranger, a guest or a host.
+/// Taken slots. Each connection counts once: as a stranger, a guest or a host.
 #[derive(Debug, Default)]
 struct Taken {
     /// Strangers in order of arrival, and so in ascending order of `number`.
@@ -57,14 +57,14 @@ struct Stranger {
     sent_away: Arc<Notify>,
 }
 
-impl Places {
+impl Slots {
     pub(super) fn new(limits: Limits) -> Arc<Self> {
         Arc::new(Self { limits, taken: Mutex::default() })
     }
 
-    /// Takes a stranger's place for a new connection. If all places are taken, another stranger loses the place first, chosen as in
+    /// Takes a stranger's slot for a new connection. If all slots are taken, another stranger loses the slot first, chosen as in
     /// [`send_one_away`](Self::send_one_away).
-    pub(super) fn take(self: &Arc<Self>, address: IpAddr) -> Arc<Seat> {
+    pub(super) fn take(self: &Arc<Self>, address: IpAddr) -> Arc<Slot> {
         let mut taken = self.lock();
         if taken.strangers.len() >= self.limits.strangers {
             taken.send_one_away();
@@ -73,8 +73,8 @@ impl Places {
         let (number, network, sent_away) = (taken.arrived, network_of(address), Arc::new(Notify::new()));
         taken.strangers.push_back(Stranger { number, network, sent_away: Arc::clone(&sent_away) });
         *taken.networks.entry(network).or_default() += 1;
-        // The seat knows the number, so that `show` and `drop` can find the stranger among the others.
-        Arc::new(Seat { places: Arc::clone(self), number, sent_away, role: Mutex::new(None) })
+        // The slot knows the number, so that `show` and `drop` can find the stranger among the others.
+        Arc::new(Slot { slots: Arc::clone(self), number, sent_away, role: Mutex::new(None) })
     }
 
     /// Ends the oldest stranger's connection from the network with the most strangers. So a flood from another network does not displace a host whose first
@@ -131,37 +131,37 @@ fn network_of(address: IpAddr) -> IpAddr {
     }
 }
 
-/// The place of a connection. Shared by all parts of the connection (requests in progress, a WebSocket), and free again when the last part is dropped.
+/// The slot of a connection. Shared by all parts of the connection (requests in progress, a WebSocket), and free again when the last part is dropped.
 #[derive(Debug)]
-pub(super) struct Seat {
-    places: Arc<Places>,
+pub(super) struct Slot {
+    slots: Arc<Slots>,
     number: u64,
     sent_away: Arc<Notify>,
     /// Highest role shown on the connection; `None` for a stranger.
     role: Mutex<Option<Role>>,
 }
 
-impl Seat {
+impl Slot {
     /// Returns whether no token was shown on the connection.
     pub(super) fn is_strange(&self) -> bool {
         self.role().is_none()
     }
 
-    /// Moves the connection to the places of `role`. A host's connection stays a host's. Returns `false` if all places of `role` are taken; the connection
-    /// then keeps its old place.
+    /// Moves the connection to the slots of `role`. A host's connection stays a host's. Returns `false` if all slots of `role` are taken; the connection
+    /// then keeps its old slot.
     pub(super) fn show(&self, role: Role) -> bool {
         let mut shown = self.role();
         if *shown == Some(role) || *shown == Some(Role::Host) {
             return true;
         }
-        // The order of locks is the same in all methods: first the seat's role, then the places.
-        let mut taken = self.places.lock();
-        if *taken.count(role) >= self.places.limits.of(role) {
+        // The order of locks is the same in all methods: first the slot's role, then the slots.
+        let mut taken = self.slots.lock();
+        if *taken.count(role) >= self.slots.limits.of(role) {
             return false;
         }
         *taken.count(role) += 1;
         match *shown {
-            // A guest that shows the host's token gives the guest's place back.
+            // A guest that shows the host's token gives the guest's slot back.
             Some(before) => *taken.count(before) -= 1,
             None => drop(taken.remove(self.number)),
         }
@@ -169,7 +169,7 @@ impl Seat {
         true
     }
 
-    /// Returns when the connection must end, because a newer connection took its place.
+    /// Returns when the connection must end, because a newer connection took its slot.
     pub(super) async fn sent_away(&self) {
         self.sent_away.notified().await;
     }
@@ -179,11 +179,11 @@ impl Seat {
     }
 }
 
-impl Drop for Seat {
+impl Drop for Slot {
     // The connection still counts for its last role, or as a stranger unless it was sent away.
     fn drop(&mut self) {
         let role = *self.role();
-        let mut taken = self.places.lock();
+        let mut taken = self.slots.lock();
         match role {
             Some(role) => *taken.count(role) -= 1,
             None => drop(taken.remove(self.number)),
@@ -201,71 +201,74 @@ mod tests {
 
     const HERE: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 
-    fn places(strangers: usize, guests: usize, hosts: usize) -> Arc<Places> {
-        Places::new(Limits { strangers, guests, hosts })
+    fn slots(strangers: usize, guests: usize, hosts: usize) -> Arc<Slots> {
+        Slots::new(Limits { strangers, guests, hosts })
     }
 
     /// Returns whether the connection was asked to end.
-    fn is_sent_away(seat: &Seat) -> bool {
+    fn is_sent_away(slot: &Slot) -> bool {
         use futures_util::FutureExt as _;
 
-        seat.sent_away().now_or_never().is_some()
+        slot.sent_away().now_or_never().is_some()
     }
 
     #[test]
     fn a_new_stranger_sends_the_oldest_one_away_and_nobody_else() {
-        let places = places(3, 1, 1);
-        let seats: Vec<_> = (0..3).map(|_| places.take(HERE)).collect();
-        assert!(seats[0].show(Role::Host));
-        let more: Vec<_> = (0..2).map(|_| places.take(HERE)).collect();
-        assert_eq!([&seats[0], &seats[1], &seats[2], &more[0], &more[1]].map(|seat| is_sent_away(seat)), [false, true, false, false, false]);
+        let slots = slots(3, 1, 1);
+        let connections: Vec<_> = (0..3).map(|_| slots.take(HERE)).collect();
+        assert!(connections[0].show(Role::Host));
+        let more: Vec<_> = (0..2).map(|_| slots.take(HERE)).collect();
+        assert_eq!(
+            [&connections[0], &connections[1], &connections[2], &more[0], &more[1]].map(|slot| is_sent_away(slot)),
+            [false, true, false, false, false]
+        );
         drop(more);
-        let _again = places.take(HERE);
-        assert!(!is_sent_away(&seats[2]), "places are free again");
+        let _again = slots.take(HERE);
+        assert!(!is_sent_away(&connections[2]), "slots are free again");
     }
 
     #[test]
     fn a_flood_from_one_network_sends_away_its_own() {
-        let places = places(8, 1, 1);
-        let visitor = places.take("192.0.2.7".parse().unwrap());
-        let flood: Vec<_> = (0..100_u128).map(|low| places.take(IpAddr::from(Ipv6Addr::from_bits((0x2001_0db8 << 96) | low)))).collect();
+        let slots = slots(8, 1, 1);
+        let visitor = slots.take("192.0.2.7".parse().unwrap());
+        let flood: Vec<_> = (0..100_u128).map(|low| slots.take(IpAddr::from(Ipv6Addr::from_bits((0x2001_0db8 << 96) | low)))).collect();
         assert!(!is_sent_away(&visitor), "64 bits of addresses are one network");
-        assert_eq!(flood.iter().filter(|seat| !is_sent_away(seat)).count(), 7);
+        assert_eq!(flood.iter().filter(|slot| !is_sent_away(slot)).count(), 7);
     }
 
     #[test]
-    fn every_role_has_places_of_its_own() {
-        let places = places(4, 2, 1);
-        let guests: Vec<_> = (0..2).map(|_| places.take(HERE)).collect();
-        assert!(guests.iter().all(|seat| seat.show(Role::Guest)));
-        let (late, host, second) = (places.take(HERE), places.take(HERE), places.take(HERE));
+    fn every_role_has_slots_of_its_own() {
+        let slots = slots(4, 2, 1);
+        let guests: Vec<_> = (0..2).map(|_| slots.take(HERE)).collect();
+        assert!(guests.iter().all(|slot| slot.show(Role::Guest)));
+        let (late, host, second) = (slots.take(HERE), slots.take(HERE), slots.take(HERE));
         assert!(!late.show(Role::Guest) && late.is_strange());
         assert!(host.show(Role::Host) && host.show(Role::Guest), "a host's connection stays one");
         assert!(!second.show(Role::Host));
         drop((guests, host));
         assert!(late.show(Role::Guest) && second.show(Role::Host));
-        assert!(late.show(Role::Guest), "it has its place already");
+        assert!(late.show(Role::Guest), "it has its slot already");
     }
 
     proptest! {
-        /// After any sequence of steps no role has more connections than places, and all places are free after the last connection.
+        /// After any sequence of steps no role has more connections than slots, and all slots are free after the last connection.
         #[test]
-        fn places_are_counted_right(steps in prop::collection::vec((0..3_u8, 0..8_usize, any::<bool>()), 0..200)) {
-            let places = places(3, 2, 1);
-            let mut seats = Vec::new();
+        fn slots_are_counted_right(steps in prop::collection::vec((0..3_u8, 0..8_usize, any::<bool>()), 0..200)) {
+            let slots = slots(3, 2, 1);
+            let mut connections = Vec::new();
             for (step, which, is_host) in steps {
                 match step {
-                    0 => seats.push(places.take(HERE)),
-                    1 if which < seats.len() => drop(seats.swap_remove(which)),
-                    2 if which < seats.len() => { seats[which].show(if is_host { Role::Host } else { Role::Guest }); }
+                    0 => connections.push(slots.take(HERE)),
+                    1 if which < connections.len() => drop(connections.swap_remove(which)),
+                    2 if which < connections.len() => { connections[which].show(if is_host { Role::Host } else { Role::Guest }); }
                     _ => {}
                 }
-                let taken = places.lock();
+                let taken = slots.lock();
                 prop_assert!(taken.strangers.len() <= 3 && taken.guests <= 2 && taken.hosts <= 1);
                 prop_assert_eq!(taken.networks.values().sum::<usize>(), taken.strangers.len());
             }
-            drop(seats);
-            let taken = places.lock();
+            drop(connections);
+            let taken = slots.lock();
             prop_assert!(taken.strangers.is_empty() && taken.guests == 0 && taken.hosts == 0);
         }
     }
