@@ -55,7 +55,7 @@ mod words;
 pub use check::{Answered, OutcomeDocument, check};
 pub use explanation::{explanation, explanation_with_costs};
 pub use methods::{Kind, Measured, MeasuredMethod, MeasurementWatch, Method, cost_picture, error_in_words, measure, methods};
-pub use parts::{access_line, link, link_quantiles, link_totals, measures_of, motion, peer, peer_links, rotation};
+pub use parts::{link, links_and_distances, measures_of, motion, peer};
 pub use pictures::{AdmittanceCurve, NamedMap, admittance_picture, axis_of, boundary_picture, map_picture};
 pub(crate) use pictures::{AdmittanceWords, admittance_words, axis_of_key, crossing_in_words, label};
 pub use run::{angle_text, diverged, measured_lines, packets, run, run_words, task_of};

@@ -63,16 +63,24 @@ impl Components {
     }
 }
 
-/// Returns the largest angle between two copies \[rad\]; `None` if the object does not turn.
-pub fn rotation(summary: &Summary) -> Option<impl Serialize + use<>> {
-    summary.max_rotation_discrepancy.map(|angle| document! { max_rotation_discrepancy_rad: angle })
+/// Returns the keys that a run and a live session have in common: links, access lines, and the largest distance and angle between two copies.
+pub fn links_and_distances(scene: &Scene, summary: &Summary) -> impl Serialize + use<> {
+    document! {
+        link_totals: link_totals(summary),
+        link_quantiles: link_quantiles(summary),
+        links: peer_links(scene, summary),
+        access_lines: summary.access_lines.iter().map(|line| access_line(scene, line)).collect::<Vec<_>>(),
+        max_discrepancy_m: summary.max_discrepancy,
+        #[serde(flatten)]
+        rotation: summary.max_rotation_discrepancy.map(|angle| document! { max_rotation_discrepancy_rad: angle }),
+    }
 }
 
 /// Greatest number of links listed singly.
 pub(crate) const MOST_LINKS: u64 = 1000;
 
 /// Returns the document of each link between two peers at the end of a run; `None` if the scene has more than 1000 links.
-pub fn peer_links(scene: &Scene, summary: &Summary) -> Option<Vec<impl Serialize + use<>>> {
+fn peer_links(scene: &Scene, summary: &Summary) -> Option<Vec<impl Serialize + use<>>> {
     let name = |peer: usize| scene.peers[peer].name.clone();
     let links = || summary.links.iter().map(|link| self::link(name(link.from), name(link.to), &link.stats));
     // The links of a large mesh would make the document long. Totals and quantiles stand for the links then.
@@ -80,7 +88,7 @@ pub fn peer_links(scene: &Scene, summary: &Summary) -> Option<Vec<impl Serialize
 }
 
 /// Returns the sums of the counters over all links between peers.
-pub fn link_totals(summary: &Summary) -> impl Serialize + use<> {
+fn link_totals(summary: &Summary) -> impl Serialize + use<> {
     document! {
         links: summary.links.len(),
         #[serde(flatten)]
@@ -89,7 +97,7 @@ pub fn link_totals(summary: &Summary) -> impl Serialize + use<> {
 }
 
 /// Returns the quantiles, over the links between peers, of the delivered fraction and of the mean delay.
-pub fn link_quantiles(summary: &Summary) -> impl Serialize + use<> {
+fn link_quantiles(summary: &Summary) -> impl Serialize + use<> {
     let of = |quantiles: Option<LinkQuantiles>| {
         quantiles.map(|LinkQuantiles { min, p01, p50, p99, max }| document! { min: min, p01: p01, p50: p50, p99: p99, max: max })
     };
@@ -107,7 +115,7 @@ pub fn link(from: String, to: String, stats: &LinkStats) -> impl Serialize + use
 }
 
 /// Returns the document of an access line at the end of a run.
-pub fn access_line(scene: &Scene, line: &AccessSummary) -> impl Serialize + use<> {
+fn access_line(scene: &Scene, line: &AccessSummary) -> impl Serialize + use<> {
     document! {
         peer: scene.peers[line.peer].name.clone(),
         line: if line.uplink { "uplink" } else { "downlink" },

@@ -10,7 +10,7 @@ use cohaptic_units::print::{Counted, SixDigits, Span};
 use cohaptic_wan::{DropCause, LinkStats};
 use serde::Serialize;
 
-use crate::parts::{MOST_LINKS, access_line, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
+use crate::parts::{MOST_LINKS, links_and_distances, measures_of, peer};
 use crate::{document, length, text_plot};
 
 /// Returns the document of a run. `task`: result of the task of the scene. `wall_s`: wall time of the run \[s\]; `None` leaves the keys of the speed out.
@@ -25,13 +25,8 @@ pub fn run(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], task: O
         // Without a clock there is no speed: equal runs then give equal documents.
         speed: wall_s.map(|wall_s| document! { wall_s: wall_s, realtime_factor: duration_s / wall_s }),
         peers: summary.peers.iter().map(peer).collect::<Vec<_>>(),
-        link_totals: link_totals(summary),
-        link_quantiles: link_quantiles(summary),
-        links: peer_links(scene, summary),
-        access_lines: summary.access_lines.iter().map(|line| access_line(scene, line)).collect::<Vec<_>>(),
-        max_discrepancy_m: summary.max_discrepancy,
         #[serde(flatten)]
-        rotation: rotation(summary),
+        links: links_and_distances(scene, summary),
         #[serde(flatten)]
         task: task.map(|task| document! { task: task_of(scene, task) }),
         #[serde(flatten)]

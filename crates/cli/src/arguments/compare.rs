@@ -1,13 +1,12 @@
 //! `compare`.
 
-use std::num::NonZeroU64;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
 use super::examples::{self, after};
-use super::numbers::{any_integer, integer, threads};
-use super::{SceneArguments, ShardArguments, TableFormat};
+use super::numbers::any_integer;
+use super::{SceneArguments, ShardArguments, TableArguments};
 
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::COMPARE))]
@@ -32,15 +31,8 @@ pub(crate) struct CompareArguments {
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) shards: ShardArguments,
-    /// Format of the table of runs
-    #[arg(long, value_enum, default_value_t = TableFormat::Parquet)]
-    pub(crate) format: TableFormat,
-    /// Number of runs made at the same time [default: one per core]. Results do not depend on it
-    #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
-    pub(crate) threads: Option<u16>,
-    /// Number of runs saved together: if the program is killed, each thread loses at most these [default: some seconds' worth]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<NonZeroU64>(1, u64::MAX))]
-    pub(crate) part: Option<NonZeroU64>,
+    #[command(flatten)]
+    pub(crate) table: TableArguments,
 }
 
 /// Named set of strategies and values.

@@ -17,6 +17,7 @@ mod scenes;
 mod shards;
 mod stability;
 mod study;
+mod tables;
 #[cfg(test)]
 mod tests;
 
@@ -40,12 +41,13 @@ pub(crate) use links::{EcnKind, FitArguments, LinkArguments, Profile};
 pub(crate) use pages::{CompletionsArguments, FileKind, InitArguments, ManArguments, SchemaArguments};
 pub(crate) use paper::PaperArguments;
 pub(crate) use realtime::{ControlFilesArguments, LiveArguments, PaceArguments, PlayArguments, RealTimeArguments, RelayArguments, RouterArguments};
-pub(crate) use scenes::{CampaignArguments, CheckArguments, ExplainArguments, MeasureArguments, RunArguments, TableFormat};
+pub(crate) use scenes::{CampaignArguments, CheckArguments, ExplainArguments, MeasureArguments, RunArguments};
 pub(crate) use shards::{ShardArguments, ShardName};
 pub(crate) use stability::{
     AdmittanceArguments, BoundaryArguments, GridSize, LinksName, MapArguments, PointArguments, RestName, StabilityArguments, StabilityCommand,
 };
 pub(crate) use study::{StudyArguments, StudyCommand, StudyFolderArguments, StudyForgetArguments, StudyRunArguments};
+pub(crate) use tables::{TableArguments, TableFormat};
 
 /// Several people feel and move one virtual object together, over a bad network.
 ///

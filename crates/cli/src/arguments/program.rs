@@ -116,7 +116,7 @@ mod tests {
             panic!()
         };
         assert_eq!(campaign.overrides.set, ["object.mass=1", "link.delay=8ms"]);
-        assert_eq!((campaign.out.as_deref(), campaign.threads), (Some(Path::new("out")), Some(3)));
+        assert_eq!((campaign.out.as_deref(), campaign.table.threads), (Some(Path::new("out")), Some(3)));
         assert!(parsed("cohaptic -q run a.toml").unwrap().quiet && parsed("cohaptic run a.toml -q").unwrap().quiet);
     }
 

@@ -1,13 +1,12 @@
 //! `run`, `check`, `explain` and `campaign`.
 
-use std::num::NonZeroU64;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::examples::{self, after};
 use super::numbers::{any_integer, integer, threads};
-use super::{Overrides, PictureArguments, SceneArguments, ShardArguments};
+use super::{Overrides, PictureArguments, SceneArguments, ShardArguments, TableArguments};
 
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::RUN))]
@@ -117,15 +116,8 @@ pub(crate) struct CampaignArguments {
     /// Judge each combination as stability point does, and write the verdict into the rows of its runs
     #[arg(long)]
     pub(crate) verdicts: bool,
-    /// Format of the table
-    #[arg(long, value_enum, default_value_t = TableFormat::Parquet)]
-    pub(crate) format: TableFormat,
-    /// Number of runs made at the same time [default: one per core]. Results do not depend on it
-    #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
-    pub(crate) threads: Option<u16>,
-    /// Number of runs saved together: if the program is killed, each thread loses at most these [default: some seconds' worth]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<NonZeroU64>(1, u64::MAX))]
-    pub(crate) part: Option<NonZeroU64>,
+    #[command(flatten)]
+    pub(crate) table: TableArguments,
     /// Do not draw pictures, and do not write campaign.html
     #[arg(long)]
     pub(crate) no_plot: bool,
@@ -158,13 +150,4 @@ impl MeasureArguments {
         let value = if names == "all" { name(names) } else { format!("[{}]", names.split(',').map(name).collect::<Vec<_>>().join(", ")) };
         Some(format!("measure.names={value}"))
     }
-}
-
-/// Format of a table.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
-pub(crate) enum TableFormat {
-    /// runs.parquet
-    Parquet,
-    /// runs.csv
-    Csv,
 }

@@ -3,7 +3,6 @@
 pub(crate) mod sharing;
 
 use std::io::Write as _;
-use std::num::NonZeroU64;
 use std::path::{Component, Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant as Clock;
@@ -16,7 +15,7 @@ use cohaptic_campaign::{
 use cohaptic_scene::{Diagnostic, Scene};
 
 use crate::analysis_watch::Interruptible;
-use crate::arguments::{CampaignArguments, TableFormat};
+use crate::arguments::CampaignArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::file::write_into;
@@ -42,14 +41,14 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
         Sharing::Whole(_) | Sharing::Merge(_) => {}
         Sharing::Shard(shard, out) => {
             let judge = |shared: &mut SharedCampaign, watch: &dyn Watch| shared.judge(shard, &JUDGE, watch);
-            let done = pool(arguments.threads, || sharing::shard(plan, shard, out, judge))?;
+            let done = pool(arguments.table.threads, || sharing::shard(plan, shard, out, judge))?;
             return shard::answer(arguments.json, &done.map_err(|ended| ended.unwrap_or_else(refused))?);
         }
         Sharing::Status(out) => return sharing::status(arguments.json, plan, out).map_err(|ended| ended.unwrap_or_else(refused)),
     }
     let out = sharing.folder().unwrap_or_else(|| Path::new("."));
     let start = Clock::now();
-    let done = pool(arguments.threads, || execute(sharing, out, plan.clone()))?;
+    let done = pool(arguments.table.threads, || execute(sharing, out, plan.clone()))?;
     let (report, paths) = done.map_err(|ended| ended.unwrap_or_else(refused))?;
     // The time covers judging and runs, and not the pictures and pages below.
     let wall_s = start.elapsed().as_secs_f64();
@@ -143,11 +142,7 @@ fn plan(arguments: &CampaignArguments, sharing: Sharing<'_>) -> Result<CampaignP
     // `--measure` joins the overrides of `--set`, so that the folder records measures with all other keys.
     let set: Vec<String> = arguments.overrides.set.iter().chain(&measures).cloned().collect();
     let (text, file) = (input::text(file)?, input::named(file));
-    let format = match arguments.format {
-        TableFormat::Parquet => Format::Parquet,
-        TableFormat::Csv => Format::Csv,
-    };
-    let part = arguments.part.map(NonZeroU64::get);
+    let (format, part) = (arguments.table.format.into(), arguments.table.part());
     let plan = CampaignPlan::new(PlanSpec { text: &text, file, set: &set, variations, runs: arguments.runs, format, part, program: PROGRAM })
         .map_err(refused)?;
     Ok(if arguments.verdicts { plan.with_verdicts() } else { plan })

@@ -3,17 +3,16 @@
 mod page;
 mod preset;
 
-use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
 use cohaptic_answers::campaign::Written;
 use cohaptic_answers::compare::{ByAnalysisOrRuns, Finished};
-use cohaptic_campaign::{CampaignError, CampaignPlan, Format, Judge, PlanSpec, SharedCampaign, Strategies, Variation, Watch};
+use cohaptic_campaign::{CampaignError, CampaignPlan, Judge, PlanSpec, SharedCampaign, Strategies, Variation, Watch};
 
 use crate::analysis_watch::Interruptible;
-use crate::arguments::{CompareArguments, MeasureArguments, TableFormat};
+use crate::arguments::{CompareArguments, MeasureArguments};
 use crate::campaign::{self, PROGRAM, Shown};
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
@@ -37,7 +36,7 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitCode, Failure>
         Sharing::Whole(_) | Sharing::Merge(_) => {}
         Sharing::Shard(shard, out) => {
             let judge = |shared: &mut SharedCampaign, watch: &dyn Watch| shared.judge_apart(shard, &JUDGE, watch);
-            let done = campaign::pool(arguments.threads, || campaign::sharing::shard(plan, shard, out, judge))?;
+            let done = campaign::pool(arguments.table.threads, || campaign::sharing::shard(plan, shard, out, judge))?;
             return shard::answer(arguments.scene.json, &done.map_err(|error| error.unwrap_or_else(refused))?);
         }
         Sharing::Status(out) => {
@@ -46,7 +45,7 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitCode, Failure>
     }
     let out = sharing.folder().unwrap_or_else(|| Path::new("."));
     let start = Clock::now();
-    let finished = campaign::pool(arguments.threads, || execute(arguments, sharing, out, plan))?;
+    let finished = campaign::pool(arguments.table.threads, || execute(arguments, sharing, out, plan))?;
     let (finished, paths) = finished.map_err(|error| error.unwrap_or_else(refused))?;
     let wall_s = start.elapsed().as_secs_f64();
     let scene = input::text(&arguments.scene.scene)?;
@@ -89,11 +88,7 @@ fn plan(arguments: &CompareArguments, asked: &Asked) -> Result<CampaignPlan, cam
     }
     let (file, set) = (&arguments.scene.scene, set(arguments));
     let (text, file) = (input::text(file).map_err(|error| said(error.into()))?, input::named(file));
-    let format = match arguments.format {
-        TableFormat::Parquet => Format::Parquet,
-        TableFormat::Csv => Format::Csv,
-    };
-    let part = arguments.part.map(NonZeroU64::get);
+    let (format, part) = (arguments.table.format.into(), arguments.table.part());
     let plan = CampaignPlan::new(PlanSpec { text: &text, file, set: &set, variations, runs: arguments.runs, format, part, program: PROGRAM });
     Ok(plan.map_err(campaign::Ended::Error)?.leaving_out(Strategies::fallback()))
 }

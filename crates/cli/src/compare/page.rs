@@ -48,7 +48,7 @@ fn command_line(arguments: &CompareArguments) -> String {
         .option("--vary", &arguments.vary)
         .option("--runs", [arguments.runs])
         .out()
-        .option("--format", (arguments.format == TableFormat::Csv).then_some("csv"))
+        .option("--format", (arguments.table.format == TableFormat::Csv).then_some("csv"))
         .text()
 }
 

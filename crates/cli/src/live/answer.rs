@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use cohaptic_answers::{access_line, link_quantiles, link_totals, measured_lines, measures_of, peer, peer_links, rotation, task_of};
+use cohaptic_answers::{links_and_distances, measured_lines, measures_of, peer, task_of};
 use cohaptic_harness::Ending;
 use cohaptic_harness::live::{GateStats, SeatStats};
 use cohaptic_harness::task::task_words;
@@ -45,13 +45,8 @@ pub(super) fn of(scene: &Scene, report: &Report, devices: &[DeviceReport]) -> im
         release_lateness_us: lateness(&report.releases),
         behind_us: micros(report.behind),
         peers: peers.collect::<Vec<_>>(),
-        link_totals: link_totals(summary),
-        link_quantiles: link_quantiles(summary),
-        links: peer_links(scene, summary),
-        access_lines: summary.access_lines.iter().map(|line| access_line(scene, line)).collect::<Vec<_>>(),
-        max_discrepancy_m: summary.max_discrepancy,
         #[serde(flatten)]
-        rotation: rotation(summary),
+        links: links_and_distances(scene, summary),
         #[serde(flatten)]
         measures: measures_of(scene, &report.measures),
         #[serde(flatten)]
