@@ -47,7 +47,7 @@ const KEYS: [Key; 20] = [
     usual("grasp", vector(POSITION), "0", "Point at which the device grasps an object that turns, from the centre of the object in its own axes"),
     optional("orientation", QUATERNION, "As the key of [object], for this peer"),
     optional("angular-velocity", vector(RATE), "As the key of [object], for this peer"),
-    usual("kind", KIND, "\"simulated\"", "Place of the peer in a live session"),
+    usual("kind", KIND, "\"simulated\"", "Location of the peer in a live session"),
     optional("silence", Form::Table(&SILENCE), "Fading of the pull of a silent peer in another program"),
     optional("falcon", Form::Table(&FALCON), "Falcon of a peer of kind falcon, or of kind udp for cohaptic join, and the meaning of its numbers"),
     optional("inverse3", Form::Table(&INVERSE3), "Inverse3 of a peer of kind inverse3, or of kind udp for cohaptic join, and its service"),
