@@ -1,16 +1,16 @@
 // ---- The copies of the object, and the peers that hold them.
 
-/** What is drawn: it follows what was measured, so that ten states a second look like motion. */
+/** Drawn positions. They follow the measured positions, so that ten states a second look like continuous motion. */
 let bodies = [];
 let view = null;
 let trails = [];
-/** The object, if it turns: its edges. */
+/** Edges of the object, if it turns. */
 let shape = null;
 
-/** How long a trail is [ms], and how fast the picture follows [ms]. */
+/** Length of a trail [ms], and time constant with which the picture follows [ms]. */
 const TRAIL = 2500;
 const FOLLOW = 60;
-/** Who wants less motion sees what was measured, ten times a second, and no trails. */
+/** With reduced motion, measured positions are drawn ten times a second, without trails. */
 const still = matchMedia('(prefers-reduced-motion: reduce)');
 const share = (passed) => (still.matches ? 1 : 1 - Math.exp(-passed / FOLLOW));
 
@@ -38,10 +38,10 @@ function takePeers(peers, body) {
   showJoined(peers);
 }
 
-/** Whether these are that many numbers. */
+/** Returns whether `values` is a list of `many` finite numbers. */
 const isAll = (values, many) => Array.isArray(values) && values.length === many && values.every(Number.isFinite);
 
-/** Takes the picture a part of the way from what it shows to what was measured. */
+/** Moves the drawn positions a part of the way to the measured positions. */
 function follow(body, passed) {
   const { peer } = body;
   const part = share(passed);
@@ -88,7 +88,7 @@ function showPeers(peers) {
   });
 }
 
-/** Says of each program that joined: which device, from where, how long ago its last sample came, and how many samples never came. */
+/** Shows for each program that has joined: its device, its address, the time since its last sample, and the number of lost samples. */
 function showJoined(peers) {
   const lines = peers
     .filter((peer) => peer.joined)
@@ -103,7 +103,7 @@ function showJoined(peers) {
   lines.forEach((line, i) => put(list.children[i] || list.appendChild(make('li')), line));
 }
 
-/** Draws the copies; called for each frame of the screen while there are any. */
+/** Draws the copies. Called for each frame of the screen while there are copies. */
 function drawCopies(passed) {
   const canvas = $('copies');
   if ($('stage').hidden || $('people').hidden) return;
@@ -136,7 +136,7 @@ function drawCopies(passed) {
   });
 }
 
-/** Where a copy was, the longer ago the fainter; in few strokes, for there are many copies. */
+/** Draws the trail of a copy, fainter for older positions; in few strokes, because there are many copies. */
 function drawTrail(context, i, where) {
   const STROKES = 12;
   const now = performance.now();
@@ -161,7 +161,7 @@ function drawTrail(context, i, where) {
   if (stroke >= 0) context.stroke();
 }
 
-/** Where the picture looks: wide enough for all trails, and steady. */
+/** Fits the shown part of the world to all trails, and changes it rarely. */
 function look(known, flat, area) {
   const low = [Infinity, Infinity];
   const high = [-Infinity, -Infinity];
@@ -220,7 +220,7 @@ function axes(context, area, x, flat, height) {
   }
 }
 
-/** One copy. One that is old is an outline. In a plane copies lie on one another, so there only what is old is named; colours stand in the table. */
+/** Draws a copy; a stale copy is an outline. In a plane copies overlap, so only stale copies have a name there. The table has the colours. */
 function cube(context, x, y, size, style, peer, named) {
   const old = peer.status === 'stale' || peer.status === 'absent';
   context.globalAlpha = 1;

@@ -1,13 +1,13 @@
 // ---- Copies that turn, in depth: boxes, the devices that hold them, and the springs between.
 
-/** From where one looks: turned about the vertical, and above the horizon [°]. 0, 0 is the view from the front: x to the right, z up. */
+/** Direction of view: angle about the vertical, and angle above the horizon [°]. 0, 0 is the view from the front: x to the right, z up. */
 const eye = { around: -30, above: 25 };
-/** What is in the picture: its middle and radius, and how many of it fit beside each other [m]. */
+/** Shown part of the world: middle and radius [m], and number of parts of the picture side by side. */
 let stage = null;
-/** The largest force so far: the colour of springs is a share of it [N]. */
+/** Largest force so far [N]. The colour of a spring is the share of this force. */
 let mostForce = 1;
 
-/** The rotation vector in world axes [°]. */
+/** Returns the rotation vector in world axes [°]. */
 function turnOf(orientation) {
   const [w, ...u] = orientation[0] < 0 ? orientation.map((value) => -value) : orientation;
   const sine = Math.hypot(...u);
@@ -15,7 +15,7 @@ function turnOf(orientation) {
   return u.map((value) => value * factor);
 }
 
-/** How points of the world lie in a part of the canvas, and how far into it. */
+/** Returns the projection of points of the world to a part of the canvas, with their depth. */
 function lens({ left, right, top, bottom }) {
   const [a, e] = [eye.around, eye.above].map((degrees) => (degrees * Math.PI) / 180);
   const across = [Math.cos(a), Math.sin(a), 0];
@@ -31,7 +31,7 @@ function lens({ left, right, top, bottom }) {
   return { place, unit, from: add3(stage.middle, into, -away) };
 }
 
-/** Draws the copies that are known, together or each in a part of its own. */
+/** Draws the known copies, together or each in a part of its own. */
 function drawDepth(context, known, width, height, passed) {
   // A plate has no thickness, but two sides.
   const least = 0.03 * Math.max(...shape.edges);
@@ -49,13 +49,13 @@ function drawDepth(context, known, width, height, passed) {
   });
 }
 
-/** Where a copy, the point at which it is held, and the device are in the picture. */
+/** Returns the positions of a copy, of its grasp point and of the device in the picture. */
 function place3(body) {
   body.matrix = matrixOf(body.turned);
   body.held = body.peer.grasp ? add3(body.at, turned(body.matrix, body.peer.grasp), 1) : null;
 }
 
-/** Holds all that is shown, and moves only if it must. */
+/** Fits the shown part of the world to all copies, and moves it only if a copy leaves it. */
 function setStage(known, reach, passed) {
   const points = [...known.map((body) => body.at), ...trails.flatMap((trail) => trail.at)].filter((at) => at && at.length === 3 && at.every(Number.isFinite));
   const low = [0, 1, 2].map((axis) => Math.min(...points.map((at) => at[axis])));
@@ -81,7 +81,7 @@ function drawPart(context, part, area, half, named) {
   for (const body of part) drawTrail(context, body.index, view.place);
   const faces = part.flatMap((body) => facesOf(body, half, view));
   faces.sort((one, other) => other.depth - one.depth);
-  // Many faces that lie on one another would be as good as opaque.
+  // Many faces on top of each other would be almost opaque.
   for (const face of faces) drawFace(context, face, 2 / (part.length + 1));
   for (const body of part) if (body.device && body.held) drawSpring(context, body, view, named || (part.length > 1 && isOld(body.peer)));
   context.restore();
@@ -89,7 +89,7 @@ function drawPart(context, part, area, half, named) {
 
 const isOld = (peer) => peer.status === 'stale' || peer.status === 'absent';
 
-/** A grid below; in the first part of the picture with the length of its squares. */
+/** Draws a grid below the copies; in the first part of the picture with the length of its squares. */
 function drawFloor(context, view, area) {
   const { middle, radius } = stage;
   const step = round125(radius / 4);
@@ -122,7 +122,7 @@ function drawFloor(context, view, area) {
   context.textBaseline = 'alphabetic';
 }
 
-/** Where x, y and z point. */
+/** Draws the directions of x, y and z. */
 function drawAxes(context, view, corner) {
   const { middle } = stage;
   const origin = view.place(middle);
@@ -139,7 +139,7 @@ function drawAxes(context, view, corner) {
   });
 }
 
-/** The faces of a copy that are seen. */
+/** Returns the visible faces of a copy. */
 function facesOf(body, half, view) {
   const corner = (unit) => add3(body.at, turned(body.matrix, unit.map((value, k) => value * half[k])), 1);
   return FACES.flatMap(({ axis, side, corners }) => {
@@ -157,7 +157,7 @@ function outline(context, points) {
   context.closePath();
 }
 
-/** One face. Copies lie within one another, so faces let through what is behind them. */
+/** Draws a face. Copies overlap, so faces are transparent. */
 function drawFace(context, { body, normal, points, sign }, weight) {
   const old = isOld(body.peer);
   context.strokeStyle = context.fillStyle = colour(body.index);
@@ -177,7 +177,7 @@ function drawFace(context, { body, normal, points, sign }, weight) {
   context.setLineDash([]);
 }
 
-/** The spring from the point at which a copy is held to the device, the redder the harder it pulls, and the force on the copy as an arrow. */
+/** Draws the spring from the grasp point of a copy to the device, redder for a larger force, and the force on the copy as an arrow. */
 function drawSpring(context, body, view, named) {
   const [held, device] = [view.place(body.held), view.place(body.device)];
   const force = Math.hypot(...body.peer.force.map(Number));
@@ -225,7 +225,7 @@ function drawName(context, peer, x, y) {
   context.fillText(peer.name + (isOld(peer) ? ' (' + peer.status + ')' : ''), x, y);
 }
 
-/** The force on a copy, from its device on: as long as it is strong. */
+/** Draws the force on a copy as an arrow from the device. Its length is proportional to the force. */
 function drawArrow(context, body, view, device) {
   const end = view.place(add3(body.device, body.peer.force, 48 / view.unit / mostForce));
   const [dx, dy] = [end.x - device.x, end.y - device.y];
@@ -244,7 +244,7 @@ function drawArrow(context, body, view, device) {
   context.stroke();
 }
 
-/** The axes of a device that turns. */
+/** Draws the axes of a device that turns. */
 function drawHandle(context, body, view, device) {
   const matrix = matrixOf(body.deviceTurned);
   context.strokeStyle = ink.text;
@@ -258,7 +258,7 @@ function drawHandle(context, body, view, device) {
   context.stroke();
 }
 
-/** The eye goes where its sliders are; the picture can be dragged as well. */
+/** Sets the direction of view by sliders, or by dragging the picture. */
 function makeEye() {
   const sliders = ['around', 'above'].map((name) => $(name));
   const tell = (slider) => slider.setAttribute('aria-valuetext', signed(Math.round(eye[slider.id]) + '°'));

@@ -1,6 +1,6 @@
-// The page left its token in the tab before it took it out of the address. A token that was just refused is not tried again.
+// The page has stored its token in the tab before removing the token from the address. A token that was just refused is not tried again.
 const kept = sessionStorage.getItem('token');
-// The token opens the page that was asked for. An address with a ticket opens `/`, because a ticket is valid once.
+// The token opens the requested page. An address with a ticket opens `/`, because a ticket is valid once.
 const page = location.pathname === '/open' ? '/' : location.pathname;
 document.querySelector('form').action = page;
 if (kept && !new URLSearchParams(location.search).has('token')) {

@@ -26,7 +26,7 @@ function makeSliders() {
       slider.range.setAttribute('aria-valuetext', slider.field.value);
       submit({ [slider.key]: slider.field.value });
     });
-    // A text that was begun is nobody else's to overwrite, until it is set or given up.
+    // A text that the user has begun is not overwritten until the user sets it or gives it up.
     slider.field.addEventListener('input', () => { slider.typing = true; });
     slider.field.addEventListener('keydown', (event) => {
       if (event.key === 'Enter' && slider.field.value.trim() !== '') {
@@ -59,7 +59,7 @@ function showTarget() {
   put($('drops-link'), name);
 }
 
-/** Puts sliders and texts where the chosen link is, but for what somebody is changing right now. */
+/** Sets sliders and texts to the values of the chosen link, apart from those that the user is changing now. */
 function showKeys() {
   const now = keys[chosen];
   if (!now) return;
@@ -90,7 +90,7 @@ function showKeys() {
   if (box.textContent !== list.map((node) => node.textContent).join('')) box.replaceChildren(...list);
 }
 
-/** What waits to be sent while a request is on its way: of a slider that moves fast, the last place is what counts. */
+/** Value to send after the running request. While a slider moves fast, only its last position is sent. */
 let waiting = null;
 let sending = false;
 
@@ -114,7 +114,7 @@ async function send() {
       say(words + (body.links ? ' on all links' : ''), false);
     } catch (error) {
       if (!waiting) sending = false;
-      // What was refused stays to be mended; Escape gives it up.
+      // A refused text stays, so that the user can correct it. Escape discards the text.
       for (const slider of SLIDERS) if (slider.key in change) slider.typing = true;
       say(error.message, true);
     }

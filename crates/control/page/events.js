@@ -1,6 +1,6 @@
 // ---- Events of the server.
 
-/** Without a word from the server for so long, the connection counts as dead [ms]. It says something every second. */
+/** Silence of the server after which the connection counts as lost [ms]. The server sends something every second. */
 const SILENCE = 4000;
 const RETRY = 1000;
 
@@ -27,7 +27,7 @@ async function listen(onState, onTrouble) {
         await readEvents(response.body, alive, onState);
       }
     } catch {
-      // Gone, or silent for too long: either way it is said below.
+      // The server is gone or silent for too long. The page says so below.
     }
     clearTimeout(timer);
     abort.abort();
@@ -47,7 +47,7 @@ async function readEvents(body, alive, onState) {
     rest += value;
     const events = rest.split('\n\n');
     rest = events.pop();
-    // If several have gathered, the last one alone is drawn; counters lose nothing by it.
+    // If several states have arrived, only the last state is drawn. Counters lose nothing by this.
     const states = events.filter((event) => event.includes('event: state'));
     if (states.length === 0) continue;
     const data = states[states.length - 1].split('\n').filter((line) => line.startsWith('data:')).map((line) => line.slice(5)).join('\n');

@@ -1,4 +1,4 @@
-// ---- What is told in words: validity, lateness, causes.
+// ---- Facts in words: validity, lateness, causes.
 
 function showRun(state) {
   put($('kind'), 'cohaptic ' + state.kind);
@@ -28,7 +28,7 @@ function showClocks(clocks) {
   });
 }
 
-/** Measures of the run so far; a scene without any has none. */
+/** Shows the measures of the run so far. A scene without measures shows none. */
 function showMeasures(measures) {
   $('measures-section').hidden = measures.length === 0;
   const body = $('measures');
@@ -47,7 +47,7 @@ function showMeasures(measures) {
   });
 }
 
-/** Causes with their counts, each with a bar of its share. */
+/** Shows causes with their counts, each with a bar of its share. */
 function showCauses(list, causes, none) {
   const entries = Object.entries(causes).filter(([, n]) => n > 0).sort((one, other) => other[1] - one[1]);
   const wanted = entries.length === 0 ? [[none, null]] : entries;

@@ -1,14 +1,14 @@
 // ---- The last minute of every link.
 
-/** How much is shown [s], and over how much loss and rate are taken [s]. */
+/** Span of the plots [s], and span over which loss and rate are averaged [s]. */
 const SHOWN = 60;
 const OVER = 1;
 
-/** One row per state that came in: { t, delay, high, loss, rate }, the last three lists in the order of the links. */
+/** Rows, one per received state: { t, delay, high, loss, rate }. Lists are in the order of the links. */
 let past = [];
 let before = null;
 
-/** Takes a state in. A run that began anew has no past. */
+/** Takes in a state. A run that has begun anew has no earlier rows. */
 function remember(state) {
   const t = state.elapsed_s;
   if (before && (t < before.t || state.links.length !== before.links)) past = [];
@@ -26,7 +26,7 @@ function remember(state) {
     row.bytes.push(link.delivered_bytes);
     row.delay.push(link.recent_delay.p50_s);
     row.high.push(link.recent_delay.p99_s);
-    // Over too little time one packet looks like a storm.
+    // Over a very short time a single packet would give a high rate.
     const long = from !== null && t >= from.t + OVER / 2;
     const offered = long ? row.offered[i] - from.offered[i] : 0;
     row.loss.push(offered > 0 ? Math.min(1, (row.dropped[i] - from.dropped[i]) / offered) : null);
@@ -35,7 +35,7 @@ function remember(state) {
   past.push(row);
 }
 
-/** Nothing is known of the time until the next state. */
+/** Marks the time until the next state as unknown. */
 function forget() {
   const last = past[past.length - 1];
   if (last && !last.gap) past.push({ t: last.t, gap: true });

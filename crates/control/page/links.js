@@ -2,10 +2,10 @@
 
 let rows = [];
 let chosen = 0;
-/** The keys that each link was told, in the order of the links. */
+/** Configured keys of each link, in the order of the links. */
 let keys = [];
 
-/** Makes the rows anew if there are other links than before. */
+/** Makes new rows if the links have changed. */
 function makeRows(links) {
   if (rows.length === links.length && rows.every((row, i) => row.name === links[i].name)) return;
   chosen = Math.min(chosen, Math.max(0, links.length - 1));
@@ -44,7 +44,7 @@ function makeRows(links) {
   choose(chosen);
 }
 
-/** Takes up the colours of a page that became light or dark. */
+/** Applies the colours after the page has become light or dark. */
 function recolourRows() {
   rows.forEach((row, i) => {
     row.swatch.style.background = rows.length <= COLOURED || i === chosen ? linkColour(i, rows.length) : '';
@@ -56,9 +56,9 @@ function filterRows() {
   for (const row of rows) row.tr.hidden = rows.length > 8 && words !== '' && !row.words.includes(words);
 }
 
-/** Makes a link the one that is drawn strong and changed. */
+/** Chooses a link: its line is drawn thick, and the editor changes it. */
 function choose(link) {
-  // A text that was begun was meant for the link that was chosen before.
+  // A text that the user has begun was meant for the previously chosen link.
   if (chosen !== link) for (const slider of SLIDERS) slider.typing = false;
   chosen = link;
   rows.forEach((row, i) => row.tr.classList.toggle('chosen', i === link));
@@ -89,7 +89,7 @@ function showRows(links) {
   }
 }
 
-/** Asks what the links were told: changes come from elsewhere too. */
+/** Asks the server for the keys of the links, because others can change the links too. */
 async function readKeys() {
   const { links } = await ask('/api/links');
   takeKeys(links);

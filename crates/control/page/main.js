@@ -21,7 +21,7 @@ function take(state) {
   showCauses($('refused'), state.refused, 'none');
   $('plots').hidden = state.links.length === 0;
   if (another) readKeys().catch(() => {});
-  // With many links a plot is some work: a few pictures a second will do.
+  // A plot of many links takes long to draw, so a few pictures a second are drawn.
   if (performance.now() - drawn > (rows.length > 24 ? 400 : 80)) redraw();
 }
 
@@ -31,7 +31,7 @@ function redraw() {
   for (const plot of PLOTS) drawPlot(plot, rows.length, chosen);
 }
 
-/** Says that the server is away, and that what is shown is old. */
+/** Says that the server does not answer, and that the shown values are old. */
 function onTrouble(text) {
   trouble = text;
   if (text !== null) forget();
@@ -43,7 +43,7 @@ function showTrouble() {
   const silent = latest && trouble === null ? (performance.now() - heard) / 1000 : 0;
   let words = '';
   if (trouble !== null) words = trouble + (latest ? '. What is shown is from ' + clock(latest.elapsed_s) + ' of the run. Trying again …' : '. Trying again …');
-  // In few steps: a screen reader says each of them.
+  // The text changes in few steps, because a screen reader reads each of them.
   else if (silent > 2) words = 'The run has reported nothing for ' + [60, 10, 2].find((s) => silent > s) + ' s or more: it has ended, or it hangs.';
   put($('trouble'), words);
   $('trouble').hidden = words === '';

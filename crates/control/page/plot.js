@@ -1,6 +1,6 @@
 // ---- Lines over time.
 
-/** A canvas as sharp as the screen; gives its context and its size in points. */
+/** Sets the resolution of a canvas to that of the screen. Returns the context, and the size in points. */
 function prepare(canvas) {
   const ratio = window.devicePixelRatio || 1;
   const width = canvas.clientWidth;
@@ -16,7 +16,7 @@ function prepare(canvas) {
   return { context, width, height };
 }
 
-/** The smallest of 1, 2, 5 times a power of ten that is not below. */
+/** Returns the smallest number of the form 1, 2 or 5 times a power of ten that is not below `number`. */
 function round125(number) {
   const power = 10 ** Math.floor(Math.log10(number));
   return [1, 2, 5, 10].map((n) => n * power).find((n) => n >= number * 0.999999);
@@ -28,7 +28,7 @@ const PLOTS = [
   { canvas: 'rate-plot', key: 'rate', least: 1e3, most: Infinity, word: (v) => bits(v, 2) },
 ];
 
-/** Draws one plot; `chosen` is drawn last and strong. */
+/** Draws a plot. The link `chosen` is drawn last, with a thick line. */
 function drawPlot(plot, links, chosen) {
   const { context, width, height } = prepare($(plot.canvas));
   if (width === 0 || past.length === 0) return;
@@ -37,7 +37,7 @@ function drawPlot(plot, links, chosen) {
   const top = 8;
   const bottom = height - 20;
   const now = past[past.length - 1].t;
-  // A run that is young has the whole width.
+  // A run shorter than the span of the plot uses the whole width.
   const shown = Math.min(SHOWN, Math.max(12, Math.ceil((now - past[0].t) / 6) * 6));
   let most = plot.least;
   for (const row of past) {
@@ -89,7 +89,7 @@ function drawPlot(plot, links, chosen) {
   context.restore();
 }
 
-/** One line, broken where nothing is known. */
+/** Draws a line, with gaps where no value is known. */
 function stroke(context, key, link, x, y, style, lineWidth) {
   context.strokeStyle = style;
   context.lineWidth = lineWidth;
@@ -109,7 +109,7 @@ function stroke(context, key, link, x, y, style, lineWidth) {
   context.stroke();
 }
 
-/** From the median to the 99th percentile. */
+/** Draws the area from the median to the 99th percentile. */
 function band(context, plot, link, x, y, style) {
   context.fillStyle = style;
   let run = [];

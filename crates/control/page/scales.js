@@ -1,6 +1,6 @@
-// ---- What has a slider.
+// ---- Keys with a slider.
 
-/** From `from` to `to` in steps, both included. */
+/** Returns the numbers from `from` to `to` in steps, both included. */
 function steps(...ranges) {
   const values = [];
   for (const [from, to, step] of ranges) {
@@ -14,7 +14,7 @@ const SPANS = { ns: 1e-6, us: 1e-3, 'µs': 1e-3, ms: 1, s: 1e3, min: 6e4, h: 3.6
 const RATES = { bit: 1, kbit: 1e3, Mbit: 1e6, Gbit: 1e9, 'bit/s': 1, 'kbit/s': 1e3, 'Mbit/s': 1e6, 'Gbit/s': 1e9 };
 const DECADES = [1e4, 1e5, 1e6, 1e7, 1e8, 1e9].flatMap((decade) => [1, 1.5, 2, 3, 5, 7].map((n) => n * decade));
 
-/** What has a slider: every place of it is a value that somebody may want. */
+/** Keys with a slider. Every position of a slider is a useful value. */
 const SLIDERS = [
   { key: 'delay', empty: '0ms', values: steps([0, 50, 1], [55, 200, 5], [250, 1000, 50]), units: SPANS, text: (ms) => ms + 'ms' },
   { key: 'jitter', empty: '0ms', values: steps([0, 10, 0.5], [12, 50, 2], [60, 200, 10]), units: SPANS, text: (ms) => ms + 'ms' },
@@ -28,7 +28,7 @@ function rateText(rate) {
   return rate / factor + unit;
 }
 
-/** The place of the nearest value. */
+/** Returns the position of the nearest value. */
 function nearest(values, number) {
   let best = 0;
   values.forEach((value, i) => {

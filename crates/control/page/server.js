@@ -1,6 +1,6 @@
 // ---- The server: the token, and requests.
 
-/** The token comes in the address and leaves it at once: it stays in this tab, and travels in headers. */
+/** Token from the address. It is removed from the address at once, stays in this tab, and is sent in headers. */
 const token = (() => {
   const query = new URLSearchParams(location.search);
   const given = query.get('token');
@@ -12,7 +12,7 @@ const token = (() => {
   return given || sessionStorage.getItem('token') || '';
 })();
 
-/** Asks and gives back the JSON of the answer; throws an Error whose message is for the user. */
+/** Sends a request and returns the JSON of the answer. Throws an Error with a message for the user. */
 async function ask(path, options = {}) {
   let response;
   try {

@@ -1,12 +1,12 @@
 // ---- Boxes and orientations in space.
 
-/** The corners of the faces of a box in halves of its edges, by axis and side, in order around the face. */
+/** Corners of the faces of a box, in halves of its edges: indexed by axis and side, in order around the face. */
 const FACES = [0, 1, 2].flatMap((axis) => [-1, 1].map((side) => ({
   axis,
   side,
   corners: [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([a, b]) => spread3(axis, side, a, b)),
 })));
-/** On the face at the end of x a triangle, on that at the end of z a square: a box that has turned by a quarter looks different. */
+/** Marks of two faces: a triangle at the end of x and a square at the end of z. So a box that has turned by a quarter looks different. */
 const SIGNS = { 0: [[-0.4, -0.4], [0.5, 0], [-0.4, 0.4]], 2: [[-0.4, -0.4], [0.4, -0.4], [0.4, 0.4], [-0.4, 0.4]] };
 
 function spread3(axis, side, a, b) {
@@ -19,10 +19,10 @@ function spread3(axis, side, a, b) {
 
 const dot3 = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const add3 = (a, b, factor) => a.map((value, axis) => value + factor * b[axis]);
-/** R·v with the rows of R. */
+/** Returns R·v, with R given by its rows. */
 const turned = (matrix, v) => matrix.map((row) => dot3(row, v));
 
-/** From body to world axes, by a quaternion of any length. */
+/** Returns the rotation from body to world axes, from a quaternion of any length. */
 function matrixOf([w, x, y, z]) {
   const f = 2 / (w * w + x * x + y * y + z * z);
   return [
@@ -32,7 +32,7 @@ function matrixOf([w, x, y, z]) {
   ];
 }
 
-/** A part of the way from one orientation to another, the short way. */
+/** Returns an orientation between two orientations, on the shorter way. */
 function towards(from, to, share) {
   const near = from.reduce((sum, value, k) => sum + value * to[k], 0) < 0 ? -1 : 1;
   const mixed = from.map((value, k) => value + (near * to[k] - value) * share);

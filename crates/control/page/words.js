@@ -1,8 +1,8 @@
-// ---- Numbers in words, and words in numbers.
+// ---- Numbers as text, and text as numbers.
 
 const $ = (id) => document.getElementById(id);
 
-/** Writes a text where it is not there yet: pages with a hundred links are touched little. */
+/** Writes a text into an element, unless the element has this text already. So a page with a hundred links changes few elements. */
 function put(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }
@@ -31,7 +31,7 @@ function inUnits(number, units, digits = 3) {
 const span = (s, digits) => (s === 0 ? '0 ms' : inUnits(s, [[1, 's'], [1e-3, 'ms'], [1e-6, 'µs'], [1e-9, 'ns']], digits));
 const bits = (rate, digits) => inUnits(rate, [[1e9, 'Gbit/s'], [1e6, 'Mbit/s'], [1e3, 'kbit/s'], [1, 'bit/s']], digits);
 const signed = (text) => text.replace('-', '\u2212');
-/** Decimals as they are, and from a million on as a power of ten: what falls apart has numbers of any size. */
+/** Returns a number as text: with decimals below a million, otherwise with a power of ten, because diverging scenes have numbers of any size. */
 const decimals = (number, digits) => signed(Math.abs(number) < 1e6 ? number.toFixed(digits) : number.toExponential(3));
 const place = (position) => {
   const large = position.some((m) => Math.abs(m) >= 1);
@@ -41,7 +41,7 @@ const newtons = (force, digits) => (Number.isFinite(force) ? decimals(force, dig
 const percent = (p) => (p === null || p === undefined || Number.isNaN(p) ? '–' : significant(p * 100, p !== 0 && p < 0.1 ? 2 : 3) + ' %');
 const count = (n) => String(n).replace(/\B(?=(\d{3})+$)/g, '\u202f');
 
-/** Minutes and seconds of a run. */
+/** Returns minutes and seconds of a run as text. */
 function clock(s) {
   const whole = Math.floor(s);
   const two = (n) => String(n).padStart(2, '0');
@@ -49,7 +49,7 @@ function clock(s) {
   return (hours ? hours + ':' + two(Math.floor(whole / 60) % 60) : Math.floor(whole / 60)) + ':' + two(whole % 60);
 }
 
-/** The number that a text such as "40ms" or "1%" is, by its unit; null if it is something else, such as a table. */
+/** Returns the number of a text such as "40ms" or "1%", in the base unit; null for anything else, such as a table. */
 function measured(text, units) {
   const match = /^\s*([-+]?[0-9.]+(?:e[-+]?[0-9]+)?)\s*([a-zµ%/]*)\s*$/i.exec(text);
   if (!match || !(match[2] in units)) return null;
@@ -57,7 +57,7 @@ function measured(text, units) {
   return Number.isFinite(number) ? number : null;
 }
 
-/** What the page is drawn with, from its style; read again when the system changes between light and dark. */
+/** Colours of the drawings, from the style of the page. Read again when the system changes between light and dark. */
 let ink = {};
 function readInk() {
   const style = getComputedStyle(document.documentElement);
@@ -66,6 +66,6 @@ function readInk() {
   for (let i = 0; i < 8; i += 1) ink.series.push(of('--c' + i));
 }
 const colour = (i) => ink.series[i % ink.series.length];
-/** Of links: many are told apart by choosing one, not by colour. */
+/** Colours of links. Many links are told apart by choosing one of them, not by colour. */
 const COLOURED = 8;
 const linkColour = (i, links) => (links > COLOURED ? ink.accent : colour(i));

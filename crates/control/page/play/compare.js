@@ -1,4 +1,4 @@
-// ---- The same hand again: its curves under both strategies, and without a network.
+// ---- Comparison: the curves of the same hand under both strategies, and without a network.
 
 let compared = null;
 
@@ -52,7 +52,7 @@ function drawCurves() {
   drawCurve('force-plot', 'force_n', 1, 'N');
 }
 
-/** Three curves over time. A curve far above the others is cut: a run that falls apart would hide them. */
+/** Draws three curves over time. A curve far above the others is cut, because a diverging run would hide the other curves. */
 function drawCurve(id, key, factor, unit) {
   const { context, width, height } = sized($(id));
   const peaks = compared.runs.map((run) => Math.max(...run[key])).sort((one, other) => one - other);

@@ -1,6 +1,6 @@
-// ---- What changes while one drags: strategy, number of peers, links.
+// ---- Controls that act during a drag: strategy, number of peers, links.
 
-/** What waits to be sent while a request is on its way: of a slider that moves fast, the last place is what counts. */
+/** Value to send after the running request. While a slider moves fast, only its last position is sent. */
 let waiting = null;
 let sending = false;
 
@@ -60,7 +60,7 @@ async function sendLinks() {
   sending = false;
 }
 
-/** The keys of the first link. */
+/** Keys of the first link. */
 let network = {};
 
 async function readLinks() {
@@ -88,7 +88,7 @@ async function beginAnew(wish) {
   }
 }
 
-/** Another part has begun. */
+/** Takes up the beginning of another part. */
 async function readFacts() {
   facts = await ask('/api/play');
   showFacts();
@@ -117,7 +117,7 @@ function showFacts() {
   $('grasp').disabled = $('sway').disabled = ownHand === null;
 }
 
-/** The numbers as text, four times a second. */
+/** Shows the numbers as text, four times a second. */
 function showNumbers() {
   if (frame === null) return;
   const body = $('peers');

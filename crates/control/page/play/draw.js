@@ -1,11 +1,11 @@
 // ---- Drawing: rooms, cubes, devices, and the springs between.
 
-/** The edge of a cube that does not turn [m]. */
+/** Edge of a cube that does not turn [m]. */
 const EDGE = 0.05;
-/** A force that colours a spring wholly [N]. */
+/** Force at which a spring has its full colour [N]. */
 const STRONG = 6;
 
-/** The canvas at the size that it has on the screen. */
+/** Sets the resolution of a canvas to its size on the screen. Returns the context and the size. */
 function sized(canvas) {
   const ratio = Math.min(devicePixelRatio || 1, 2);
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
@@ -26,7 +26,7 @@ function drawAll(passed, now) {
   const canvas = $('rooms');
   if (document.hidden || frame === null || canvas.clientWidth === 0) return;
   follow(passed);
-  // After a lost connection to a study the picture may come before the number of the own peer.
+  // After a lost connection to a study, a picture may come before the number of the own peer.
   if (!shown[ownPlace()]) return;
   lookAround(passed);
   const { context, width, height } = sized(canvas);
@@ -63,7 +63,7 @@ function drawRoom(context, room, i) {
   context.restore();
 }
 
-/** Where another peer has the cube: an outline. */
+/** Draws the copy of another peer as an outline. */
 function drawGhost(context, room, body, k) {
   context.strokeStyle = colour(k);
   context.lineWidth = 1;
@@ -74,7 +74,7 @@ function drawGhost(context, room, body, k) {
   context.setLineDash([]);
 }
 
-/** The walls between which the copies are, where there are any along x and y. */
+/** Draws the walls along x and y, if the scene has walls. */
 function drawWalls(context, room) {
   const far = (value, other) => (Number.isFinite(value) ? value : other);
   const [min, max] = [facts.walls[0].map((value) => far(value, -LARGEST_REACH)), facts.walls[1].map((value) => far(value, LARGEST_REACH))];
@@ -105,11 +105,11 @@ function drawCube(context, room, body, i) {
   context.stroke();
 }
 
-/** The corners of the faces of a box that are seen, each face with how bright it is. */
+/** Returns the visible faces of a box: the corners and the brightness of each. */
 function facesSeen(room, body) {
   const matrix = matrixOf(body.turned);
   const half = facts.edges.map((edge) => Math.max(edge, 0.03 * Math.max(...facts.edges)) / 2);
-  // All that lies along it is at one point of the canvas: see onCanvas.
+  // All points along this direction are at one point of the canvas: see onCanvas.
   const view = [...SLANT, 1];
   return FACES.flatMap(({ axis, side, corners }) => {
     const normal = matrix.map((row) => side * row[axis]);
@@ -141,16 +141,16 @@ function outlineBox(context, room, body) {
   }
 }
 
-/** Where a peer holds the object: of one that turns a point of its own. */
+/** Returns the point at which a peer holds the object. An object that turns has a grasp point per peer. */
 function graspOf(body, i) {
   const grasp = facts.peers[i] && facts.peers[i].grasp;
   return grasp ? add3(body.at, turned(matrixOf(body.turned), grasp), 1) : body.at;
 }
 
-/** The device, and the spring from it to the copy: it stretches as the two come apart, and reddens with the force. */
+/** Draws the device, and the spring from the device to the copy, redder for a larger force. */
 function drawPull(context, room, body, i) {
   const [from, to] = [onCanvas(room, graspOf(body, i)), onCanvas(room, body.device)];
-  // 5 N stretch a stiff spring by millimetres: the way is drawn longer than it is, but not out of the room.
+  // 5 N stretch a stiff spring by millimetres only. The spring is drawn longer than it is, but within the room.
   const stretch = Math.min(6, (0.45 * Math.min(room.width, room.height)) / (Math.hypot(to.x - from.x, to.y - from.y) || 1));
   const end = { x: from.x + (to.x - from.x) * stretch, y: from.y + (to.y - from.y) * stretch };
   const [dx, dy] = [end.x - from.x, end.y - from.y];
@@ -183,7 +183,7 @@ function drawPull(context, room, body, i) {
   context.stroke();
 }
 
-/** Where the own hand wants the device to be. */
+/** Draws the position at which the own hand wants the device. */
 function drawHand(context, room) {
   const { x, y } = onCanvas(room, hand.at);
   context.strokeStyle = ink.accent;

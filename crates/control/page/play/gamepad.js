@@ -1,4 +1,4 @@
-// ---- A gamepad's stick moves the hand; its motors, or those of a phone, give the force.
+// ---- Gamepads: the stick moves the hand, and the motors of the gamepad or of a phone pulse with the force.
 
 const STICK_SPEED = 0.18;
 const REST = 0.15;
@@ -22,7 +22,7 @@ function stepGamepad(passed, now) {
   pulse(pads, Math.min(1, lengthOf(shown[ownHand].force) / STRONG));
 }
 
-/** A short pulse as strong as the force; phones have motors that are on or off, so there it is as long. */
+/** Gives a short pulse. On a gamepad the strength of the pulse follows the force; on a phone, whose motor is on or off, the length does. */
 function pulse(pads, strength) {
   if (strength < 0.05 || still.matches) return;
   for (const { vibrationActuator } of pads) {
@@ -30,6 +30,6 @@ function pulse(pads, strength) {
       vibrationActuator.playEffect('dual-rumble', { duration: 2 * PULSE, strongMagnitude: strength, weakMagnitude: strength / 2 }).catch(() => {});
     }
   }
-  // Browsers allow it to a page that was tapped or clicked; the first touch counts at its end.
+  // Browsers allow vibration only after a tap or a click on the page. The first touch counts when it ends.
   if (hand.touched && navigator.vibrate && navigator.userActivation?.hasBeenActive !== false) navigator.vibrate(Math.round(PULSE * strength));
 }

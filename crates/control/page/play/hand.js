@@ -1,10 +1,10 @@
-// ---- The hand: where it wants the device to be, by mouse, pen or finger.
+// ---- The hand: the wanted position of the device, by mouse, pen or finger.
 
-/** No hand goes farther [m]. */
+/** Largest distance of a hand from the origin [m]. */
 const FARTHEST = 0.5;
 const hand = { holding: false, at: [0, 0, 0], swaying: null, pressed: false, touched: false };
 
-/** Takes hold of the device where it is, so that nothing jerks. */
+/** Takes hold of the device at its present position, so that the device does not jerk. */
 function takeHold() {
   if (hand.holding || ownHand === null || !shown[ownHand]) return;
   hand.holding = true;
@@ -31,7 +31,7 @@ function showHolding() {
   put(button, hand.holding ? 'Let go' : 'Take hold');
   const holds = hand.pressed ? 'you hold it until you release' : 'you hold it: Escape lets go';
   put($('holding'), ownHand === null ? 'you look on' : hand.holding ? holds : 'nobody holds your device');
-  // In a study nobody moves the hand but the person.
+  // In a study only the person moves the hand.
   $('sway')?.setAttribute('aria-pressed', String(hand.swaying !== null));
   $('rooms').classList.toggle('held', hand.holding);
 }
@@ -41,7 +41,7 @@ function makeHand() {
   let last = null;
   canvas.addEventListener('pointerdown', (event) => {
     if (event.button !== 0) return;
-    // A press that takes hold lets go at its end. A hand that held before goes on holding, so that the mouse is free for the controls.
+    // A press that takes hold lets go when it ends. A hand that already held keeps holding, so that the mouse is free for the controls.
     hand.pressed = !hand.holding || hand.pressed || hand.swaying !== null;
     hand.swaying = null;
     hand.touched = event.pointerType === 'touch';
@@ -75,11 +75,11 @@ function makeHand() {
   });
 }
 
-/** Once a picture: says where the hand is. */
+/** Sends the position of the hand. Called once per picture. */
 function stepHand(now) {
   if (!hand.holding) return;
   if (hand.swaying) {
-    // To and fro along a figure of eight, from where the hand is.
+    // The hand moves along a figure of eight that begins at its position.
     const t = (now - hand.swaying.begin) / 1000;
     const [x, y] = [0.04 * Math.sin(2.2 * t), facts.axes > 1 ? 0.02 * Math.sin(4.4 * t) : 0];
     hand.at = hand.swaying.from.map((value, axis) => value + [x, y, 0][axis]);

@@ -1,6 +1,6 @@
-// ---- The keyboard alone.
+// ---- Control by the keyboard alone.
 
-/** How fast keys move the hand [m/s]. */
+/** Speed of the hand while a key is held [m/s]. */
 const KEY_SPEED = 0.12;
 const WAYS = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0], ArrowDown: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1] };
 const pressed = new Set();

@@ -12,14 +12,14 @@ function onTrouble(text, looksOn) {
   document.body.classList.toggle('stale', lost);
   put($('server'), lost ? 'disconnected' : 'connected');
   $('server').className = 'pill ' + (lost ? 'bad' : 'good');
-  // The server may have another token now, or know more.
+  // After a lost connection the server may have another token or other facts.
   if (!lost) readFacts().catch(() => {});
   else ask('/api/play').catch((error) => {
     if (error.message.startsWith('no token')) put($('trouble'), 'The server has another token now: open the address that it printed.');
   });
 }
 
-/** What was too late and by how much, what that means, and what one can do. */
+/** Returns a text about late ticks: how many were late and by how much, what this means, and what the visitor can do. */
 const whyNotValid = (reason) => 'Not valid as a measurement, because ticks of the simulation came too late: ' + reason + '. The computer is too busy. The motion '
   + 'is computed right all the same, but the hand felt it later than the links say. Close other programs and pages, or take fewer peers; then “Put everything back” counts anew.';
 

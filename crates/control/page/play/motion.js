@@ -1,16 +1,16 @@
-// ---- What moves: the pictures of the server, and the way between two of them.
+// ---- Motion: the pictures of the server, and the interpolation between two of them.
 
-/** How fast the picture follows [ms]: 50 pictures a second look like 60. */
+/** Time constant with which the drawing follows the pictures [ms], so that 50 pictures a second look like 60. */
 const FOLLOWS = 18;
-/** With reduced motion measured places are drawn, without a way in between and without flying dots. */
+/** With reduced motion, measured positions are drawn without interpolation, and no dots fly. */
 const still = matchMedia('(prefers-reduced-motion: reduce)');
 
 let facts = { part: 0, peers: [], axes: 1, edges: null, host: false };
 let frame = null;
-/** Each peer as it is drawn: its copy, its device, the force, its turn. In a study the server tells of the own peer alone, and all others are null. */
+/** Drawn state of each peer: copy, device, force, turn. In a study the server tells the own peer alone, and all other peers are null. */
 let shown = [];
 
-/** Three numbers, whatever the scene has. */
+/** Returns three numbers, with zeros for axes that the scene does not have. */
 const wide = (values) => [0, 1, 2].map((axis) => (values && Number.isFinite(values[axis]) ? values[axis] : 0));
 
 function takeFrame(next) {
@@ -21,7 +21,7 @@ function takeFrame(next) {
   return another;
 }
 
-/** Moves the drawn places towards the measured ones. */
+/** Moves the drawn positions towards the measured positions. */
 function follow(passed) {
   if (frame === null) return;
   const share = still.matches ? 1 : 1 - Math.exp(-passed / FOLLOWS);
@@ -38,11 +38,11 @@ function follow(passed) {
 }
 
 const lengthOf = (v) => Math.hypot(...v);
-/** How far out the farthest copy is [m]. */
+/** Returns the largest distance of a copy from the origin [m]. */
 const farthestOut = () => Math.max(0, ...shown.map((body) => lengthOf(body.at)));
 
-/** The largest distance between two copies [m]; null if a copy has no finite place. Of measured places: the drawn ones follow, and of a fast swing they
- * show less. */
+/** Returns the largest distance between two copies [m]; null if a copy has no finite position. Measured positions count, because drawn positions follow
+ * and show less of a fast swing. */
 function farthest() {
   const places = frame.peers.map((peer) => peer.at);
   if (!places.flat().every(Number.isFinite)) return null;

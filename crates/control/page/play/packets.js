@@ -1,4 +1,4 @@
-// ---- Packets on their way: dots from room to room, slower than they are.
+// ---- Packets in flight: dots from room to room, slower than real packets.
 
 const SLOWER = 20;
 const FALL = 500;
@@ -10,7 +10,7 @@ function takePackets(packets) {
   const now = performance.now();
   for (const [from, to, ms, lost] of packets) {
     if (dots.length >= MOST_DOTS) return;
-    // Not all at once: pictures come fifty times a second.
+    // The packets of a picture are spread over the time until the next picture, because pictures come fifty times a second.
     dots.push({ from, to, begin: now + Math.random() * 20, over: Math.max(150, ms * SLOWER), lost: lost === 1 });
   }
 }
@@ -22,7 +22,7 @@ function drawPackets(context, rooms, now) {
     if (!from || !to || now < dot.begin) continue;
     const [a, b] = [middleOf(from), middleOf(to)];
     const length = Math.hypot(b.x - a.x, b.y - a.y) || 1;
-    // There and back are two ways.
+    // Packets of the two directions have separate lanes.
     const side = { x: (-(b.y - a.y) / length) * 9, y: ((b.x - a.x) / length) * 9 };
     const gone = (now - dot.begin) / dot.over;
     const share = dot.lost ? Math.min(gone, 0.5) : Math.min(gone, 1);

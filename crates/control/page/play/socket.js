@@ -1,17 +1,18 @@
-// ---- The WebSocket: the places of the hand go out, pictures of the motion come in.
+// ---- The WebSocket: positions of the hand go out, pictures of the motion come in.
 
-/** A connection that says nothing for so long is dead [ms]. */
+/** Silence after which the connection counts as lost [ms]. */
 const DEAD = 4000;
 const AGAIN = 1000;
 
-/** The hand that this page has; null if it only looks on. */
+/** Number of the hand of this page; null if the page only looks on. */
 let ownHand = null;
 let socket = null;
 
 /** Ends the connection for good. */
 let disconnect = () => {};
 
-/** Connects for ever. `onFrame` gets each picture, `onNews` what a study says, `onTrouble` a text when the connection is lost, and null when it is back. */
+/** Connects, and connects again after each loss. `onFrame` gets each picture, `onNews` each message of a study, and `onTrouble` a text after a loss and null
+ * after a return. */
 function connect(onFrame, onTrouble, onNews) {
   let ended = false;
   disconnect = () => {
@@ -34,7 +35,7 @@ function connect(onFrame, onTrouble, onNews) {
       const said = JSON.parse(data);
       if ('hand' in said) {
         ownHand = said.hand;
-        // Of a connection that was lost the server may not know yet: then any hand will do.
+        // The server may not know yet that the connection was lost. Then any hand is taken.
         wanted = said.hand === null ? null : String(said.hand);
         onTrouble(said.refused ? 'You look on: ' + said.refused : null, said.hand === null);
       } else if (said.page) onNews(said);
@@ -51,7 +52,7 @@ function connect(onFrame, onTrouble, onNews) {
   open();
 }
 
-/** Says where the hand is; null: it lets go. */
+/** Sends the position of the hand; null lets go. */
 function tellHand(place) {
   if (socket && socket.readyState === WebSocket.OPEN && ownHand !== null) socket.send(JSON.stringify(place));
 }

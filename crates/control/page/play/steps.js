@@ -1,11 +1,11 @@
-// ---- The first minute: three sentences, each with something to do.
+// ---- The first minute: three steps, each with a sentence and an action.
 
 const delayNow = () => measured(network.delay ?? '0ms', SPANS) ?? 0;
-/** How far the own hand has moved since the step began [m]. */
+/** Distance that the own hand has moved since the beginning of the step [m]. */
 let moved = 0;
 let lastPlace = null;
 
-/** How long a hand has let go [ms], so that one has seen what follows. */
+/** Time since the hand has let go [ms]. A step ends only after the visitor has seen the effect. */
 const idle = (now) => (hand.holding ? 0 : now - (hand.released ?? now));
 
 const isUnder = (strategy) => facts.strategy === strategy && delayNow() >= 100;
@@ -41,7 +41,7 @@ let step = 0;
 function makeSteps() {
   for (const { text, button, act } of STEPS) {
     const item = make('li');
-    // A narrow screen shows one step alone, which would be counted as the first.
+    // A narrow screen shows one step alone. Without its number a screen reader would count this step as the first.
     item.value = $('steps').children.length + 1;
     item.append(make('p', '', text));
     if (button) {
@@ -67,7 +67,7 @@ function showSteps() {
   put($('why'), all ? WHY : '');
 }
 
-/** Once a picture: how far the hand has moved, and whether that was the step. */
+/** Measures the motion of the hand and ends a finished step. Called once per picture. */
 function watchSteps(now) {
   if (step >= STEPS.length || !facts.guided) return;
   if (hand.holding) {

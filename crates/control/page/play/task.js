@@ -1,8 +1,8 @@
-// ---- The task: its target in each room, a ring that fills while the copies stay there, and what is asked for in words.
+// ---- The task: the target in each room, a ring that fills while the copies stay at the target, and the request in words.
 
 const TASK_OUTCOMES = { done: 'Done', 'timed-out': 'The time is over', failed: 'Failed', diverged: 'The copies came apart', unfinished: 'The task ended before its time' };
 
-/** What is asked for now, as a sentence. */
+/** Returns the present request of the task as a sentence. */
 function taskWords(task) {
   if (task.outcome) return TASK_OUTCOMES[task.outcome] + (task.targets > 1 ? ', ' + task.reached + ' of ' + task.targets + ' targets reached' : '');
   const what = {
@@ -15,7 +15,7 @@ function taskWords(task) {
   return task.until > 0 ? 'Soon: ' + what : what;
 }
 
-/** The sentence, and the time left, four times a second. Only the sentence is announced: a clock would speak all the time. */
+/** Shows the request and the time left, four times a second. Only the request is announced: a screen reader would read a clock all the time. */
 function showTask() {
   const task = frame && frame.task;
   $('task').hidden = !task;
@@ -26,10 +26,10 @@ function showTask() {
   put($('task-left'), task.outcome ? '' : task.until > 0 ? 'begins in ' + left(task.until) : left(task.left) + ' left');
 }
 
-/** The radius of the target on the canvas; a target without one is a point. */
+/** Returns the radius of the target on the canvas. A target without a radius is a point. */
 const radiusOf = (room) => Math.max(5, (frame.task.radius || 0) * scaleOf(room));
 
-/** The target: a disc as large as its radius, and a cross in the middle. Of a path also the line and its lane, whose half width is the radius. */
+/** Draws the target: a disc of its radius, and a cross in the middle. For a path also the line and its lane, whose half width is the radius. */
 function drawTarget(context, room) {
   const { task } = frame;
   if (!task) return;
@@ -69,7 +69,7 @@ function drawTarget(context, room) {
   context.globalAlpha = 1;
 }
 
-/** The ring: over the cube, which is there while the ring fills. */
+/** Draws the ring, in front of the cube. */
 function drawDwell(context, room) {
   const { task } = frame;
   if (!task || task.outcome || !(task.dwelt > 0)) return;
