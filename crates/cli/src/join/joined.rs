@@ -74,18 +74,19 @@ impl Joined<'_> {
             let device = self.device.kind();
             return format!(
                 "nothing is sent to {session} yet: the {device} of {name} is not there, or not ready. cohaptic {device} probe says why; \
-                 --device simulated joins without one"
+                 --device simulated joins without a device"
             );
         }
-        let everywhere = format!("no session listens there, or a firewall on the way drops UDP; its number, the seed of its scene, is not {seed}");
-        let seat = format!("its peer at place {place} ({name} here) is not of kind \"udp\", or another program has the seat of that peer");
+        let everywhere =
+            format!("no session listens there, or a firewall on the way drops UDP; the number of the session, the seed of its scene, is not {seed}");
+        let seat = format!("the peer at place {place} of the session ({name} here) is not of kind \"udp\", or another program has its seat");
         if self.is_keyed {
             format!(
-                "no welcome from {session} yet. Possible reasons: {everywhere}; it has no key, or another one than --key-file; {seat}; its scene is \
-                 another one than {identity}, and then the session prints both fingerprints"
+                "no welcome from {session} yet. Possible reasons: {everywhere}; the session has no key, or another one than --key-file; {seat}; the \
+                 session has another scene than {identity}, and then prints both fingerprints"
             )
         } else {
-            format!("nothing from {session} yet. Possible reasons: {everywhere}; it has a key, which --key-file must name here, too; {seat}")
+            format!("nothing from {session} yet. Possible reasons: {everywhere}; the session has a key, which --key-file must name here, too; {seat}")
         }
     }
 }

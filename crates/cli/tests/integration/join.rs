@@ -263,7 +263,7 @@ fn a_wrong_key_scene_place_or_kind_is_a_sentence() {
     let join = |words: &str| desk.cohaptic(&format!("join {address} lab.toml --device simulated {UNHURRIED} {words}"));
     let left = "--peer left --key-file session.key";
     let no_welcome =
-        &["no welcome from 127.0.0.1:", "Possible reasons: no session listens there", "another one than --key-file", "its scene is another one"];
+        &["no welcome from 127.0.0.1:", "Possible reasons: no session listens there", "another one than --key-file", "has another scene than"];
     let with_other_key = join("--for 2.5s --peer left --key-file other.key");
     with_other_key.assert_refused(3, no_welcome);
     // After two seconds `join` lists the reasons and goes on asking. The error at the end lists the reasons again.
