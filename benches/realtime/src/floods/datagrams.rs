@@ -32,7 +32,7 @@ pub const ADDRESSES: u8 = 64;
 pub struct Aim {
     /// Its number.
     pub session: u64,
-    /// The place that hellos ask for.
+    /// Place of the seat that hellos ask for.
     pub place: u32,
     /// Its key.
     pub key: SessionKey,

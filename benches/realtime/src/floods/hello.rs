@@ -56,7 +56,7 @@ pub struct Row {
     pub kernel_drops: Option<u64>,
 }
 
-/// Runs a session under a flood, at which `honest` peers knock one after another.
+/// Runs a session under a flood, in which `honest` peers ask for a seat one after another.
 ///
 /// # Errors
 ///
@@ -163,8 +163,8 @@ pub fn section(honest: u32) -> Result<String, Box<dyn Error>> {
     let mut text = String::from("## Hellos and noise at a session with a key\n\n");
     writeln!(
         text,
-        "A session with two simulated peers, one that is in from the beginning, and a free place. The flood goes to the port of the session. Its hellos ask for the\n\
-         free place, at which {honest} honest peers knock one after another, each for at most {} s. *Longest* is the longest time from the first hello of a peer to the\n\
+        "A session with two simulated peers, one that is in from the beginning, and a free seat. The flood goes to the port of the session. Its hellos ask for the\n\
+         free seat, for which {honest} honest peers ask one after another, each for at most {} s. *Longest* is the longest time from the first hello of a peer to the\n\
          first sample of another peer that it hears. *In before* are samples of the peer that is in, which the session took, of\n\
          its datagrams, hellos included. *Processor* is the share of one core that the session's thread used.\n",
         PATIENCE.as_secs()
