@@ -275,7 +275,7 @@ fn a_wrong_key_scene_place_or_kind_is_a_sentence() {
     let joined = join(&format!("{left} --for 300ms --set peers.left.falcon.device=first"));
     assert_eq!(joined.status, Some(0), "{}", joined.stderr);
     // A session with a key does not answer a `join` without a key, and the key is among the possible reasons.
-    join("--peer left --for 300ms").assert_refused(3, &["nothing from 127.0.0.1:", "it has a key, which --key-file must name here, too"]);
+    join("--peer left --for 300ms").assert_refused(3, &["nothing from 127.0.0.1:", "the session has a key, which --key-file must name here, too"]);
 
     // A file that is not there has the status of a scene that is not there. A file without a key, and a key that others may read, are wrong inputs.
     desk.write("empty.key", "");
