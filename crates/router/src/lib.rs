@@ -57,4 +57,4 @@ pub use engine::{Count, Counters, Departure, Engine, LaneSnapshot, NoSuchLink, R
 pub use packet::{Content, Ecn, Fragment, Framing, Headers, Join, Malformed, Packet, Unreachable};
 pub use rules::{Decided, Rules};
 pub use run::{Report, Router, RunError, Written};
-pub use side::{AnyDevice, Device, Failed, Interface, OpenError, Sent, Tun, lead_all};
+pub use side::{AnyDevice, Device, Failed, Interface, OpenError, Sent, Tun, lead_all, lead_own};

@@ -77,6 +77,20 @@ impl Packet {
         Self::around(by, source.ip(), icmp(by), &message)
     }
 
+    /// Returns the headers of the packet that an error message of ICMP for IPv4 quotes (RFC 792). The length is that of the quote, which the sender of the
+    /// message may have cut. Returns `None` for every other packet, and for a quote without a whole header.
+    #[must_use]
+    pub fn quoted_headers(&self) -> Option<Headers> {
+        // Unreachable, source quench, redirect, time exceeded, parameter problem.
+        const ERRORS: [u8; 5] = [3, 4, 5, 11, 12];
+        let (bytes, headers) = self.whole(Protocol::ICMP)?;
+        let message = bytes.get(headers.transport?..)?;
+        let mut quote = message.get(8..).filter(|_| ERRORS.contains(&message[0]))?.to_vec();
+        let length = u16::try_from(quote.len()).ok()?;
+        quote.get_mut(2..4)?.copy_from_slice(&length.to_be_bytes());
+        Headers::read(&quote).ok()
+    }
+
     /// Returns a packet of IP around a transport header with its data, and computes both checksums.
     fn around(source: IpAddr, destination: IpAddr, protocol: Protocol, segment: &[u8]) -> Option<Self> {
         let mut bytes = Self::quoted(source, destination, protocol, segment)?;
@@ -205,6 +219,24 @@ mod tests {
             let quoted = Headers::read(&packet.bytes()[header + 8..]).unwrap();
             assert_eq!((quoted.destination, quoted.ports), (ends(texts)[1].ip(), Some([1000, 2000])));
             assert!(is_right(packet.bytes(), &Headers::read(packet.bytes()).unwrap()));
+        }
+    }
+
+    /// The quote of a long packet is cut, and has its ends all the same.
+    #[test]
+    fn the_quote_of_an_error_message_is_read() {
+        let [source, destination] = ends(V4);
+        let error = Packet::unreachable("10.0.0.9".parse().unwrap(), Protocol::UDP, [source, destination], 0, Unreachable::Port).unwrap();
+        let mut bytes = error.bytes().to_vec();
+        // The length in the quote is that of the quoted packet, of which few bytes are here.
+        bytes[30..32].copy_from_slice(&1500_u16.to_be_bytes());
+        let quoted = Packet::new(bytes.clone(), Framing::Ip).quoted_headers().unwrap();
+        assert_eq!((quoted.source, quoted.destination, quoted.ports), (source.ip(), destination.ip(), Some([1000, 2000])));
+        // An echo request has data and no quote, and a message may end before the quote does.
+        bytes[20] = 8;
+        assert_eq!(Packet::new(bytes, Framing::Ip).quoted_headers(), None);
+        for packet in [Packet::datagram(source, destination, b"hello"), Packet::around(source.ip(), destination.ip(), Protocol::ICMP, &[3; 20])] {
+            assert_eq!(packet.unwrap().quoted_headers(), None);
         }
     }
 }

@@ -3,6 +3,7 @@
 mod interface;
 mod namespace;
 mod netlink;
+mod routes;
 mod tun;
 
 use std::io;
@@ -13,7 +14,8 @@ use cohaptic_linkfile::router::{Attachment, Side};
 
 use crate::packet::Packet;
 pub use interface::Interface;
-pub use tun::{Tun, lead_all};
+pub use routes::{lead_all, lead_own};
+pub use tun::Tun;
 
 /// Device that gives and takes packets without ever blocking.
 pub trait Device {

@@ -1,6 +1,7 @@
-//! Requests of rtnetlink (rtnetlink(7)) for a device: the state, the length of packets and of the queue, the addresses, and promiscuous mode.
+//! Requests of rtnetlink (rtnetlink(7)): the state of a device, the length of its packets and of its queue, its addresses and settings, promiscuous mode,
+//! routes, and the rules for the choice of a table of routes.
 
-use core::net::IpAddr;
+use core::net::{IpAddr, Ipv4Addr};
 use std::io;
 use std::os::fd::{AsRawFd as _, OwnedFd};
 
@@ -17,8 +18,14 @@ pub(super) struct Netlink {
 const NEW_LINK: u16 = 16;
 /// `RTM_NEWADDR`.
 const NEW_ADDRESS: u16 = 20;
+/// `RTM_DELADDR`.
+const DELETE_ADDRESS: u16 = 21;
 /// `RTM_NEWROUTE`.
 const NEW_ROUTE: u16 = 24;
+/// `RTM_NEWRULE`.
+const NEW_RULE: u16 = 32;
+/// `RTM_DELRULE`.
+const DELETE_RULE: u16 = 33;
 /// `NLM_F_REQUEST` and `NLM_F_ACK`: a request that the kernel answers.
 const REQUEST: u16 = 0x1 | 0x4;
 /// `NLM_F_CREATE` and `NLM_F_REPLACE`: an object that exists already is no error.
@@ -27,16 +34,58 @@ const CREATE: u16 = 0x400 | 0x100;
 const ATTRIBUTE_MTU: u16 = 4;
 /// `IFLA_TXQLEN`.
 const ATTRIBUTE_QUEUE: u16 = 13;
+/// `IFLA_AF_SPEC`.
+const ATTRIBUTE_FAMILIES: u16 = 26;
+/// `IFLA_INET_CONF`.
+const ATTRIBUTE_SETTINGS: u16 = 1;
 /// `IFA_ADDRESS`.
 const ATTRIBUTE_ADDRESS: u16 = 1;
 /// `IFA_LOCAL`.
 const ATTRIBUTE_LOCAL: u16 = 2;
+/// `RTA_DST`.
+const ATTRIBUTE_DESTINATION: u16 = 1;
 /// `RTA_OIF`.
 const ATTRIBUTE_DEVICE: u16 = 4;
+/// `RTA_PREFSRC`.
+const ATTRIBUTE_OWN_SOURCE: u16 = 7;
+/// `FRA_SRC`.
+const ATTRIBUTE_SOURCE: u16 = 2;
+/// `FRA_IIFNAME`.
+const ATTRIBUTE_FROM_DEVICE: u16 = 3;
+/// `FRA_PRIORITY`.
+const ATTRIBUTE_PRIORITY: u16 = 6;
 /// `IFF_UP`.
 const FLAG_UP: u32 = 0x1;
 /// `IFF_PROMISC`.
 const FLAG_PROMISCUOUS: u32 = 0x100;
+
+/// `RT_TABLE_MAIN`: table of the routes to other hosts.
+pub(super) const MAIN: u8 = 254;
+/// `RT_TABLE_LOCAL`: table of the addresses of the namespace.
+pub(super) const LOCAL: u8 = 255;
+
+/// Setting of IPv4 of a device, by its number in `linux/ip.h`. The file of the same name is below `/proc/sys/net/ipv4/conf`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u16)]
+pub(super) enum Setting {
+    /// `accept_local`: packets with a source address of this namespace are accepted from the device.
+    AcceptLocal = 23,
+    /// `route_localnet`: packets from and to 127.0.0.0/8 may pass the device.
+    RouteLocalnet = 26,
+}
+
+/// Rule of IPv4 for the choice of a table of routes (ip-rule(8)).
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Rule {
+    /// Place among the rules: rules with lower numbers are asked first.
+    pub(super) priority: u32,
+    /// `true` if the rule is for packets that programs of the namespace send, and `false` if the rule is for arriving packets too.
+    pub(super) is_for_sent: bool,
+    /// Network of the sources for which the rule is, with its prefix, or `None` for all sources.
+    pub(super) source: Option<(Ipv4Addr, u8)>,
+    /// Table with the route. `None`: the packet is refused, and its sender gets `EINVAL`.
+    pub(super) table: Option<u8>,
+}
 
 impl Netlink {
     /// Opens a socket in the network namespace of the calling thread.
@@ -75,27 +124,47 @@ impl Netlink {
 
     /// Adds an address with its prefix to a device.
     pub(super) fn address(&self, index: u32, network: Network) -> io::Result<()> {
-        let family = if network.address().is_ipv4() { AddressFamily::Inet } else { AddressFamily::Inet6 };
-        // Fields of `struct ifaddrmsg`: family, prefix, flags, scope, index.
-        let mut body = vec![u8::try_from(family as i32).map_err(io::Error::other)?, network.prefix(), 0, 0];
-        body.extend(index.to_ne_bytes());
-        match network.address() {
-            IpAddr::V4(address) => [ATTRIBUTE_LOCAL, ATTRIBUTE_ADDRESS].map(|kind| attribute(&mut body, kind, &address.octets())),
-            IpAddr::V6(address) => [ATTRIBUTE_LOCAL, ATTRIBUTE_ADDRESS].map(|kind| attribute(&mut body, kind, &address.octets())),
-        };
-        self.ask(NEW_ADDRESS, REQUEST | CREATE, &body)
+        self.ask(NEW_ADDRESS, REQUEST | CREATE, &addressed(index, network))
     }
 
-    /// Adds the default route of an address family: packets to all addresses without a narrower route go into the device.
-    pub(super) fn lead_all(&self, index: u32, family: AddressFamily) -> io::Result<()> {
-        /// `RT_TABLE_MAIN`, `RTPROT_STATIC`, `RT_SCOPE_UNIVERSE` and `RTN_UNICAST`.
-        const KIND: [u8; 4] = [254, 4, 0, 1];
-        // Fields of `struct rtmsg`: family, lengths of destination and source, type of service, the kind, and flags.
-        let mut body = vec![u8::try_from(family as i32).map_err(io::Error::other)?, 0, 0, 0];
+    /// Removes an address from a device.
+    pub(super) fn remove_address(&self, index: u32, network: Network) -> io::Result<()> {
+        self.ask(DELETE_ADDRESS, REQUEST, &addressed(index, network))
+    }
+
+    /// Gives a setting of IPv4 of a device the value 1. The kernel lets the owner of the namespace do so also where /proc/sys cannot be written, as in
+    /// containers.
+    pub(super) fn switch_on(&self, index: u32, setting: Setting) -> io::Result<()> {
+        let mut body = link(index, 0, 0);
+        attribute(&mut body, ATTRIBUTE_FAMILIES, &nested(INET.into(), &nested(ATTRIBUTE_SETTINGS, &nested(setting as u16, &1_u32.to_ne_bytes()))));
+        self.ask(NEW_LINK, REQUEST, &body)
+    }
+
+    /// Adds a route to a table: packets to a network go into the device. A socket without an address gets the address `source`, or, with `None`, an address
+    /// of the device.
+    pub(super) fn route(&self, index: u32, to: Network, table: u8, source: Option<IpAddr>) -> io::Result<()> {
+        /// `RTPROT_STATIC`, `RT_SCOPE_UNIVERSE` and `RTN_UNICAST`.
+        const KIND: [u8; 3] = [4, 0, 1];
+        // Fields of `struct rtmsg`: family, lengths of destination and source, type of service, table, the kind, and flags.
+        let mut body = vec![family(to.address()), to.prefix(), 0, 0, table];
         body.extend(KIND);
         body.extend([0; 4]);
+        attribute(&mut body, ATTRIBUTE_DESTINATION, &octets(to.address()));
         attribute(&mut body, ATTRIBUTE_DEVICE, &index.to_ne_bytes());
+        if let Some(source) = source {
+            attribute(&mut body, ATTRIBUTE_OWN_SOURCE, &octets(source));
+        }
         self.ask(NEW_ROUTE, REQUEST | CREATE, &body)
+    }
+
+    /// Adds a rule.
+    pub(super) fn add_rule(&self, rule: Rule) -> io::Result<()> {
+        self.ask(NEW_RULE, REQUEST | CREATE, &rule.body())
+    }
+
+    /// Removes a rule.
+    pub(super) fn remove_rule(&self, rule: Rule) -> io::Result<()> {
+        self.ask(DELETE_RULE, REQUEST, &rule.body())
     }
 
     /// Sends a request and waits for the answer. Returns the error in the answer.
@@ -105,6 +174,55 @@ impl Netlink {
         let length = recv(self.socket.as_raw_fd(), &mut answer, MsgFlags::empty())?;
         verdict(&answer[..length])
     }
+}
+
+impl Rule {
+    /// Returns a `struct fib_rule_hdr` with its attributes.
+    fn body(self) -> Vec<u8> {
+        /// `FR_ACT_TO_TBL` and `FR_ACT_BLACKHOLE`.
+        const ACTIONS: [u8; 2] = [1, 6];
+        let action = ACTIONS[usize::from(self.table.is_none())];
+        // Fields: family, lengths of destination and source, type of service, table, two reserved bytes, action, and flags.
+        let mut body = vec![INET, 0, self.source.map_or(0, |(_, prefix)| prefix), 0, self.table.unwrap_or(0), 0, 0, action];
+        body.extend([0; 4]);
+        attribute(&mut body, ATTRIBUTE_PRIORITY, &self.priority.to_ne_bytes());
+        if let Some((source, _)) = self.source {
+            attribute(&mut body, ATTRIBUTE_SOURCE, &source.octets());
+        }
+        if self.is_for_sent {
+            // The kernel looks for the route of a sent packet as if the packet had come from the loopback interface.
+            attribute(&mut body, ATTRIBUTE_FROM_DEVICE, b"lo\0\0");
+        }
+        body
+    }
+}
+
+/// `AF_INET`.
+const INET: u8 = 2;
+/// `AF_INET6`.
+const INET6: u8 = 10;
+
+/// Returns the family of an address, as the headers of requests name the family.
+const fn family(address: IpAddr) -> u8 {
+    if address.is_ipv4() { INET } else { INET6 }
+}
+
+/// Returns the bytes of an address.
+fn octets(address: IpAddr) -> Vec<u8> {
+    match address {
+        IpAddr::V4(address) => address.octets().to_vec(),
+        IpAddr::V6(address) => address.octets().to_vec(),
+    }
+}
+
+/// Returns a `struct ifaddrmsg` about an address of a device: family, prefix, flags, scope, index, and the address itself.
+fn addressed(index: u32, network: Network) -> Vec<u8> {
+    let mut body = vec![family(network.address()), network.prefix(), 0, 0];
+    body.extend(index.to_ne_bytes());
+    for kind in [ATTRIBUTE_LOCAL, ATTRIBUTE_ADDRESS] {
+        attribute(&mut body, kind, &octets(network.address()));
+    }
+    body
 }
 
 /// Returns a message with its header (`struct nlmsghdr`): length, kind, flags, the sequence number 1, and the port 0.
@@ -130,6 +248,13 @@ fn attribute(body: &mut Vec<u8>, kind: u16, value: &[u8]) {
     let length = 4 + u16::try_from(value.len()).unwrap_or(u16::MAX - 4);
     body.extend([length, kind].map(u16::to_ne_bytes).concat());
     body.extend(value);
+}
+
+/// Returns a `struct rtattr` for the value of another attribute.
+fn nested(kind: u16, value: &[u8]) -> Vec<u8> {
+    let mut body = Vec::new();
+    attribute(&mut body, kind, value);
+    body
 }
 
 /// Returns the verdict in an answer: zero is success, and a negative number is the negated error number.
@@ -159,6 +284,16 @@ mod tests {
         assert_eq!(message[4..8], [16_u16, 5].map(u16::to_ne_bytes).concat());
         assert_eq!(message[20..24], 7_u32.to_ne_bytes());
         assert_eq!(message[32..36], [8_u16, 4].map(u16::to_ne_bytes).concat());
+    }
+
+    /// A rule for sent packets names the loopback interface, and a rule without a table refuses.
+    #[test]
+    fn a_rule_has_the_layout_of_the_kernel() {
+        let all = Rule { priority: 10, is_for_sent: false, source: None, table: Some(LOCAL) };
+        assert_eq!(all.body(), [&[2, 0, 0, 0, 255, 0, 0, 1, 0, 0, 0, 0][..], &nested(6, &10_u32.to_ne_bytes())].concat());
+        let refused = Rule { priority: 6, is_for_sent: true, source: Some((Ipv4Addr::new(127, 0, 0, 0), 8)), table: None };
+        let attributes = [nested(6, &6_u32.to_ne_bytes()), nested(2, &[127, 0, 0, 0]), nested(3, b"lo\0\0")].concat();
+        assert_eq!(refused.body(), [&[2, 0, 8, 0, 0, 0, 0, 6, 0, 0, 0, 0][..], &attributes].concat());
     }
 
     #[test]

@@ -10,7 +10,6 @@ use std::sync::Arc;
 
 use cohaptic_linkfile::router::TunSpec;
 use nix::net::if_::if_nametoindex;
-use nix::sys::socket::AddressFamily;
 use tun_rs::DeviceBuilder;
 
 use super::netlink::Netlink;
@@ -95,25 +94,6 @@ fn configure(index: u32, spec: &TunSpec) -> Result<(), Failed> {
     }
     // Last, so that no packet arrives at a device that is only half configured.
     netlink.up(index).map_err(Failed::system("switch it on"))
-}
-
-/// Prepares the new network namespace of the calling thread: switches the loopback interface on, and leads all packets to other hosts into the device of
-/// `spec`, in both versions of IP in which the device has an address.
-///
-/// # Errors
-///
-/// [`Failed`] with the failed step.
-pub fn lead_all(spec: &TunSpec) -> Result<(), Failed> {
-    let netlink = Netlink::open().map_err(Failed::system("speak to the kernel through rtnetlink"))?;
-    let index = |name: &str| if_nametoindex(name).map_err(|error| Failed::system(format!("look up the number of {name}"))(error.into()));
-    netlink.up(index("lo")?).map_err(Failed::system("switch the loopback interface on"))?;
-    let device = index(&spec.name)?;
-    for (family, is_v4) in [(AddressFamily::Inet, true), (AddressFamily::Inet6, false)] {
-        if spec.addresses.iter().any(|network| network.address().is_ipv4() == is_v4) {
-            netlink.lead_all(device, family).map_err(Failed::system("lead all packets into it"))?;
-        }
-    }
-    Ok(())
 }
 
 impl Device for Tun {
