@@ -6,9 +6,11 @@ use core::time::Duration;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-use cohaptic_router::{Content, Packet};
+use cohaptic_router::{Content, Headers, Packet};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{Fate, LinkModel, LinkStats, Network, NetworkConfig, NodeId, PacketEvent, PacketRecord, Path};
+
+use crate::loopback::Loopback;
 
 /// Hosts of a network, and the links between them.
 #[derive(Debug)]
@@ -20,13 +22,16 @@ pub struct Exchange {
     routes: BTreeMap<IpAddr, NodeId>,
     /// Host that gets the packets to all other addresses, or `None` if these packets are dropped.
     gateway: Option<NodeId>,
+    /// Way of the packets of a host to itself, or `None` if these packets are dropped.
+    loopback: Option<Loopback>,
     /// Latest instant given by the driver.
     now: Instant,
     /// Instant up to which the cross packets of all links are computed.
     caught_up: Instant,
     /// Links with cross-traffic.
     with_cross: Vec<Path>,
-    /// Packets inside the links, indexed by sender. Signed, because the end of a copy can be reported before the making of the copy.
+    /// Packets inside the links, indexed by sender. Packets of both links of a loopback count at its node. Signed, because the end of a copy can be reported
+    /// before the making of the copy.
     held: Vec<i64>,
     /// Bytes of IP inside the links.
     held_bytes: i64,
@@ -52,6 +57,8 @@ pub struct Departure {
     pub at: Instant,
     /// Record of the way: sender and receiver, the number of the packet on its link, and marks.
     pub record: PacketRecord<Path>,
+    /// Host that gets the packet: the receiver of the link, and on both links of a loopback the host itself.
+    pub to: NodeId,
     /// Packet, with the marks and bit errors of its link.
     pub packet: Arc<Packet>,
 }
@@ -96,6 +103,7 @@ impl Exchange {
             names,
             routes: addresses.collect(),
             gateway: gateway.map(NodeId::new),
+            loopback: None,
             now: Instant::ZERO,
             caught_up: Instant::ZERO,
             with_cross,
@@ -107,6 +115,13 @@ impl Exchange {
         }
     }
 
+    /// Lets the packets of a host to itself pass links: packets of clients the link from `host` to `node`, and packets of servers the link from `node` to
+    /// `host`. Packets to itself are those to 127.0.0.0/8, to `::1`, and to an address of the host. The sender of the first packet of a flow is the client.
+    #[must_use]
+    pub fn with_loopback(self, host: usize, node: usize) -> Self {
+        Self { loopback: Some(Loopback::new(NodeId::new(host), NodeId::new(node))), ..self }
+    }
+
     /// Passes a packet from a host. An instant before the latest instant counts as the latest instant.
     pub fn handle_packet(&mut self, now: Instant, from: NodeId, packet: Packet) {
         self.handle_timeout(now);
@@ -114,7 +129,7 @@ impl Exchange {
             self.counts.malformed += 1;
             return;
         };
-        let Some(to) = self.receiver(headers.destination).filter(|to| *to != from) else {
+        let Some(path) = self.path(from, &packet, headers) else {
             self.counts.no_host += 1;
             return;
         };
@@ -123,11 +138,29 @@ impl Exchange {
             self.counts.overload += 1;
             return;
         }
-        self.held[usize::from(from.0)] += 1;
+        let holder = self.holder(path);
+        self.held[holder] += 1;
         self.held_bytes += bytes;
-        let offered = self.network.handle_packet(self.now, from, to, info, Arc::new(packet));
+        let offered = self.network.handle_packet(self.now, path.from, path.to, info, Arc::new(packet));
         debug_assert_eq!(offered, Ok(()), "time has not gone back, and every pair of hosts has a link");
         self.drain();
+    }
+
+    /// Returns the link for a packet of a host, or `None` if no other host has the destination.
+    fn path(&mut self, from: NodeId, packet: &Packet, headers: &Headers) -> Option<Path> {
+        let to = headers.destination;
+        let is_to_itself = to.is_loopback() || self.routes.get(&to) == Some(&from);
+        if let Some(loopback) = self.loopback.as_mut().filter(|loopback| is_to_itself && loopback.host == from) {
+            return Some(loopback.link(packet, headers));
+        }
+        self.receiver(to).filter(|to| *to != from).map(|to| Path { from, to })
+    }
+
+    /// Returns the place of a link in the list of held packets. Packets of a host to itself are not those of the host, because nothing outside waits for
+    /// such packets.
+    fn holder(&self, path: Path) -> usize {
+        let node = self.loopback.as_ref().filter(|loopback| loopback.has(path)).map_or(path.from, |loopback| loopback.node);
+        usize::from(node.0)
     }
 
     /// Returns the host that gets the packets to an address.
@@ -167,9 +200,9 @@ impl Exchange {
     /// Collects the events of the links: deliveries become departures, and each end of a packet frees room.
     fn drain(&mut self) {
         while let Some(event) = self.network.poll_event() {
-            let (from, bytes) = (usize::from(event.path.from.0), i64::try_from(event.size.get()).unwrap_or(i64::MAX));
+            let (holder, bytes) = (self.holder(event.path), i64::try_from(event.size.get()).unwrap_or(i64::MAX));
             let sign = if event.fate.is_end() { -1 } else { 1 };
-            self.held[from] += sign;
+            self.held[holder] += sign;
             self.held_bytes += sign * bytes;
             // The copies of a packet have the number of the packet, so that a dropped copy has no number of its own.
             if matches!(event.fate, Fate::Dropped(_)) && event.copy == 0 {
@@ -190,11 +223,13 @@ impl Exchange {
                     packet.damage(damage);
                 }
             }
-            self.departures.push_back(Departure { at, record, packet });
+            let path = record.path;
+            let to = self.loopback.as_ref().filter(|loopback| loopback.has(path)).map_or(path.to, |loopback| loopback.host);
+            self.departures.push_back(Departure { at, record, to, packet });
         }
     }
 
-    /// Returns the number of packets of a host inside links.
+    /// Returns the number of packets of a host inside links, without packets to itself.
     #[must_use]
     pub fn in_flight(&self, from: NodeId) -> u64 {
         self.held.get(usize::from(from.0)).map_or(0, |held| u64::try_from(*held).unwrap_or(0))
@@ -266,6 +301,38 @@ mod tests {
             std::iter::from_fn(|| exchange.poll_departure()).map(|departure| (departure.at.as_nanos(), departure.record.path.to.0)).collect();
         assert_eq!(departures, [(10_000_000, 1), (10_000_000, 2)]);
         assert_eq!((exchange.in_flight(NodeId(0)), exchange.held_bytes()), (0, Bytes::new(0)));
+    }
+
+    /// Packets of a host to itself take a link for each direction, and arrive at the host. The host does not count as their sender.
+    #[test]
+    fn a_loopback_has_a_link_for_each_direction() {
+        let model = |from, to| link_from_keys(&[format!("delay={}ms", 10 * from + to)]).unwrap();
+        let node = |name: &str, addresses: &[[u8; 4]]| Node {
+            name: name.to_owned(),
+            addresses: addresses.iter().map(|address| (*address).into()).collect(),
+        };
+        let nodes = [node("a", &[[10, 0, 0, 1]]), node("world", &[]), node("loopback", &[])];
+        let mut exchange = Exchange::new(1, &nodes, Some(1), model).with_loopback(0, 2);
+        let ends = |text: &str| text.parse().unwrap();
+        let packets = [
+            ["127.0.0.1:5", "127.0.0.1:4"],
+            ["127.0.0.1:4", "127.0.0.1:5"],
+            ["10.0.0.1:5", "10.0.0.1:4"],
+            ["127.0.0.1:4", "127.0.0.2:4"],
+            ["10.0.0.1:5", "192.0.2.1:4"],
+        ];
+        for [from, to] in packets {
+            exchange.handle_packet(Instant::ZERO, NodeId(0), Packet::datagram(ends(from), ends(to), b"data").unwrap());
+        }
+        // The world has no loopback here.
+        exchange.handle_packet(Instant::ZERO, NodeId(1), Packet::datagram(ends("192.0.2.1:1"), ends("127.0.0.1:1"), b"data").unwrap());
+        assert_eq!((exchange.in_flight(NodeId(0)), exchange.in_flight(NodeId(2)), exchange.counts().no_host), (1, 4, 1));
+        exchange.handle_timeout(Instant::from_nanos(30_000_000));
+        let way =
+            |departure: Departure| (departure.at.as_nanos() / 1_000_000, departure.record.path.from.0, departure.record.path.to.0, departure.to.0);
+        let departures: Vec<_> = std::iter::from_fn(|| exchange.poll_departure()).map(way).collect();
+        assert_eq!(departures, [(1, 0, 1, 1), (2, 0, 2, 0), (2, 0, 2, 0), (2, 0, 2, 0), (20, 2, 0, 0)]);
+        assert_eq!((exchange.in_flight(NodeId(2)), exchange.held_bytes()), (0, Bytes::new(0)));
     }
 
     /// The link names the packets that it dropped, but not all packets of a long run.

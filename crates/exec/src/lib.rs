@@ -11,8 +11,9 @@
 //!
 //! A [`Search`] runs a plan with many seeds, and finds the smallest set of lost packets with which the command fails.
 //!
-//! [`run`] runs a [`Plan`]: hosts with their commands, links between the hosts, and a [`Gateway`] to the real world. An [`Exchange`] is the network without a
-//! clock. The processes inside are the program itself, which must call [`run_inside`] first of all.
+//! [`run`] runs a [`Plan`]: hosts with their commands, links between the hosts, and a [`Gateway`] to the real world. With [`Setup::loopback`], packets of a host
+//! to itself pass links too. An [`Exchange`] is the network without a clock. The processes inside are the program itself, which must call [`run_inside`] first
+//! of all.
 //!
 //! The crate prints nothing. Its library of links is `cohaptic-wan`, its devices are those of `cohaptic-router`, and its TCP is `cohaptic-tcp`.
 //!
@@ -44,6 +45,7 @@ mod exchange;
 mod gateway;
 mod host;
 mod inside;
+mod loopback;
 mod lost;
 mod name_server;
 mod search;

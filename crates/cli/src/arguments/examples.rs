@@ -151,7 +151,7 @@ const EXEC: &[&str] = &[
     "cohaptic exec 'delay 50ms loss 1%' --back 'delay 50ms rate 10mbit' -- python3 client.py",
     "cohaptic exec 'delay 20ms 5ms' --listen 8080 -- node server.js",
     "cohaptic exec net.toml --set link.loss=5% --out out",
-    "cohaptic exec 'delay 20ms loss 5%' --seeds 1..40 -- python3 -m pytest",
+    "cohaptic exec 'delay 20ms loss 5%' --loopback --seeds 1..40 -- python3 -m pytest",
     "cohaptic exec 'delay 20ms' --lose 'command->world:0' --runs 10 -- npm test",
 ];
 

@@ -31,6 +31,10 @@ pub(crate) struct ExecArguments {
     /// [without an address: 127.0.0.1]
     #[arg(long, value_name = "[ADDRESS:]PORT", value_parser = listened)]
     pub(crate) listen: Vec<SocketAddr>,
+    /// Lead packets of the command to its own addresses, such as localhost, through the link too: a test that starts its own server needs no change. The
+    /// server's side of the link has the name loopback
+    #[arg(long)]
+    pub(crate) loopback: bool,
     /// Name server that answers the command's questions [default: the first of /etc/resolv.conf]
     #[arg(long, value_name = "ADDRESS", value_parser = served)]
     pub(crate) dns: Option<SocketAddr>,

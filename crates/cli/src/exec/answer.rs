@@ -174,8 +174,12 @@ pub(super) fn trials(arguments: &ExecArguments, plan: &Plan, trials: &Trials) ->
         Verdict::Lost(case, count) => line(&fault(arguments, plan, case, *count)),
     }
     if trials.packets == 0 {
-        line("no packet has passed a link. Packets to localhost stay within a command; a server beside the command has the name host, as in");
-        line("  -- env SERVER=http://host:8000 COMMAND");
+        line("no packet has passed a link");
+        // A file of hosts has no option for the loopback, and its hosts have names.
+        if !arguments.command.is_empty() && !arguments.loopback {
+            line("with --loopback, packets of the command to localhost pass a link too. A server beside the command has the name host, as in");
+            line("  -- env SERVER=http://host:8000 COMMAND");
+        }
     }
     if !trials.printed.is_empty() {
         line("the last run that failed printed:");
@@ -200,6 +204,7 @@ fn again(arguments: &ExecArguments, plan: &Plan, case: &Case) -> String {
     };
     line.option("--back", &arguments.back)
         .option("--listen", &arguments.listen)
+        .flag("--loopback", arguments.loopback)
         .option("--dns", arguments.dns)
         .option("--seed", needs_seed(plan, &case.lost).then_some(case.seed))
         .option("--lose", lost::texts(&case.lost, &plan.nodes()))

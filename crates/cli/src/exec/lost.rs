@@ -7,8 +7,9 @@ use crate::failure::Failure;
 /// Text of `--lose` for no packet.
 pub(super) const NONE: &str = "none";
 
-/// Reads the texts of `--lose`. `nodes` are the names of the hosts and of the real world.
-pub(super) fn read(texts: &[String], nodes: &[&str]) -> Result<LostPackets, Failure> {
+/// Reads the texts of `--lose`. `nodes` are the names of the hosts, of the real world and of the loopback. `has_link` says whether a node has a link to another
+/// one.
+pub(super) fn read(texts: &[String], nodes: &[&str], has_link: impl Fn(usize, usize) -> bool) -> Result<LostPackets, Failure> {
     let mut lost = Vec::new();
     for text in texts.iter().filter(|text| *text != NONE) {
         let refused = |fault: &str| {
@@ -24,6 +25,9 @@ pub(super) fn read(texts: &[String], nodes: &[&str]) -> Result<LostPackets, Fail
         let (from, to) = (node(from)?, node(to)?);
         if from == to {
             return Err(refused("a host has no link to itself"));
+        }
+        if !has_link(from, to) {
+            return Err(refused(&format!("there is no link from {} to {}", nodes[from], nodes[to])));
         }
         for number in numbers.split(',') {
             let number = number.trim().parse().map_err(|_| refused(&format!("{:?} is not the number of a packet", number.trim())))?;
@@ -51,7 +55,8 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read_again() {
-        let nodes = ["command", "world"];
+        let nodes = ["command", "world", "loopback"];
+        let read = |texts: &[String], nodes: &[&str]| read(texts, nodes, |from, to| from == 0 || to == 0);
         let given = ["command -> world: 2, 6".to_owned(), "world->command:3,".to_owned()];
         let lost = read(&["world->command:3".to_owned(), given[0].clone()], &nodes).unwrap();
         assert_eq!(texts(&lost, &nodes), ["command -> world: 2, 6", "world -> command: 3"]);
@@ -64,7 +69,8 @@ mod tests {
             (given[1].as_str(), "--lose \"world->command:3,\": \"\" is not the number of a packet"),
             ("0", "there is no colon: expected a link and its packets, such as 'command -> world: 0, 3', or none"),
             ("command: 0", "there is no arrow"),
-            ("a -> world: 0", "there is no host \"a\" among command, world"),
+            ("a -> world: 0", "there is no host \"a\" among command, world, loopback"),
+            ("world -> loopback: 0", "there is no link from world to loopback"),
             ("world -> world: 0", "a host has no link to itself"),
             ("command -> world: -1", "\"-1\" is not the number of a packet"),
         ] {

@@ -37,7 +37,7 @@ pub(super) fn plan(arguments: &ExecArguments) -> Result<Plan, Failure> {
     if arguments.lose.is_empty() {
         return Ok(plan);
     }
-    let lost = lost::read(&arguments.lose, &plan.nodes())?;
+    let lost = lost::read(&arguments.lose, &plan.nodes(), |from, to| plan.has_link(from, to))?;
     Ok(plan.losing(&lost))
 }
 
@@ -46,7 +46,7 @@ fn is_file(spec: &str) -> bool {
     Path::new(spec).exists() || input::is_standard_input(Path::new(spec))
 }
 
-/// Returns the plan of a single command, with the link between the command and the real world.
+/// Returns the plan of a single command, with the link between the command and the real world, and the same link between the command and its loopback.
 fn of_command(arguments: &ExecArguments) -> Result<Plan, Failure> {
     // A file may have the name of a link, such as starlink. So a spec is taken for a file only if the spec is no link.
     let there = link(&arguments.spec).map_err(|failure| match arguments.spec.as_slice() {
@@ -59,13 +59,14 @@ fn of_command(arguments: &ExecArguments) -> Result<Plan, Failure> {
     let gateway = GatewayPlan { listen: arguments.listen.clone(), ..gateway(arguments, WORLD) };
     let command = HostPlan {
         name: COMMAND.to_owned(),
-        setup: setup(0, None, Vec::new(), Some(&gateway)),
+        setup: Setup { loopback: arguments.loopback, ..setup(0, None, Vec::new(), Some(&gateway)) },
         command: arguments.command.clone(),
         is_main: true,
         ready: None,
         output: if arguments.json { Output::ToError } else { Output::Shared },
     };
-    let links = LinkTable::new(2, Arc::new(there), [((1, 0), Arc::new(back))]);
+    let (nodes, back) = (2 + usize::from(arguments.loopback), Arc::new(back));
+    let links = LinkTable::new(nodes, Arc::new(there), (1..nodes).map(|other| ((other, 0), Arc::clone(&back))));
     Ok(whole(arguments, vec![command], Some(gateway), links))
 }
 
@@ -80,6 +81,12 @@ fn of_file(arguments: &ExecArguments, path: &Path) -> Result<Plan, Failure> {
     if !arguments.listen.is_empty() {
         return Err(Failure::Input(format!(
             "--listen leads to a command after two dashes. Hosts of the file {} are reached by each other: expected a client as a further host, whose command is its key command under [[hosts]]",
+            path.display()
+        )));
+    }
+    if arguments.loopback {
+        return Err(Failure::Input(format!(
+            "--loopback is for a command after two dashes. Packets between the hosts of the file {} pass its links: expected a server as a further host, whose command is its key command under [[hosts]]",
             path.display()
         )));
     }
@@ -116,6 +123,7 @@ fn setup(place: u8, name: Option<&str>, others: Vec<(u8, String)>, gateway: Opti
         addresses: host(place).into_iter().zip(PREFIX).filter_map(network).collect(),
         hosts: machine.into_iter().chain(others.into_iter().map(|(other, name)| (host(other)[0], name))).collect(),
         name_server: gateway.and_then(|gateway| gateway.name_server).map(|_| NAMES[0]),
+        loopback: false,
     }
 }
 

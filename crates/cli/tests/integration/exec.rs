@@ -8,6 +8,8 @@ use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream, ToSocketAddrs as _,
 use std::os::unix::process::CommandExt as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -39,7 +41,7 @@ pub(super) fn with_role(desk: &Desk, options: &str, role: &str) -> Command {
 }
 
 /// Runs the command inside to its end, and returns what it says.
-fn said_by(desk: &Desk, options: &str, role: &str) -> Vec<String> {
+pub(super) fn said_by(desk: &Desk, options: &str, role: &str) -> Vec<String> {
     let outcome = Running::begin(with_role(desk, options, role)).end();
     assert_eq!(outcome.status, Some(0), "{role}: {}\n{}", outcome.stdout, outcome.stderr);
     outcome.stdout.lines().filter_map(|line| line.split_once("inside: ")).map(|(_, said)| said.to_owned()).collect()
@@ -100,6 +102,64 @@ fn be_inside() {
                     std::process::exit(7);
                 }
             }
+        }
+        // Connects to a server of this process at each name, and sends data there and back.
+        ["own-tcp", names @ ..] => {
+            for name in names {
+                let listener = TcpListener::bind((*name, 0)).unwrap();
+                let to = listener.local_addr().unwrap();
+                thread::spawn(move || {
+                    let (mut stream, _) = listener.accept().unwrap();
+                    std::io::copy(&mut stream.try_clone().unwrap(), &mut stream).unwrap();
+                    stream.shutdown(Shutdown::Write).unwrap();
+                });
+                let data: Vec<u8> = (0..100_000_u32).map(|place| u8::try_from(place % 251).unwrap()).collect();
+                let begin = Instant::now();
+                let mut stream = TcpStream::connect((*name, to.port())).unwrap();
+                let handshake = begin.elapsed().as_millis();
+                let mut sender = stream.try_clone().unwrap();
+                let sent = data.clone();
+                let sending = thread::spawn(move || {
+                    sender.write_all(&sent).unwrap();
+                    sender.shutdown(Shutdown::Write).unwrap();
+                });
+                let mut back = Vec::new();
+                stream.read_to_end(&mut back).unwrap();
+                sending.join().unwrap();
+                println!("inside: {handshake} {}", back == data);
+            }
+        }
+        // Asks a server of this process by datagrams, without repetitions. Says which questions have an answer, and how many have reached the server, whose
+        // port is the lower or the higher one.
+        ["own-udp", port, count, length] => {
+            let mut sockets = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
+            sockets.sort_by_key(|socket| socket.local_addr().unwrap().port());
+            let [low, high] = sockets;
+            let (server, client) = if *port == "low" { (low, high) } else { (high, low) };
+            let to = server.local_addr().unwrap();
+            let questions = Arc::new(AtomicU32::new(0));
+            let asked = Arc::clone(&questions);
+            thread::spawn(move || {
+                let mut data = vec![0; 65_536];
+                while let Ok((length, from)) = server.recv_from(&mut data) {
+                    asked.fetch_add(1, Ordering::Relaxed);
+                    server.send_to(&data[..length], from).unwrap();
+                }
+            });
+            client.set_read_timeout(Some(Duration::from_millis(1500))).unwrap();
+            let question = vec![7; length.parse().unwrap()];
+            let answers = (0..count.parse::<u32>().unwrap()).map(|_| {
+                client.send_to(&question, to).unwrap();
+                let mut answer = vec![0; 65_536];
+                client.recv(&mut answer).map_or('0', |length| if answer[..length] == question { '1' } else { '?' })
+            });
+            let answers: String = answers.collect();
+            println!("inside: {answers} {}", questions.load(Ordering::Relaxed));
+        }
+        // Addresses of IPv6 at which a server can listen.
+        ["six"] => {
+            let kinds = ["[::1]:0", "[::]:0"].map(|at| TcpListener::bind(at).err().map(|error| error.kind()));
+            println!("inside: {kinds:?}");
         }
         // A datagram that is longer than a packet, and its echo.
         ["long", to] => {
@@ -317,6 +377,7 @@ fn a_wrong_call_is_told_with_what_was_expected() {
             "exec net.toml --back 'delay 1ms'",
             "net.toml has its own links: expected [[links]] with from and to there, or --set links.FROM.TO.delay=20ms",
         ),
+        ("exec net.toml --loopback", "--loopback is for a command after two dashes. Packets between the hosts of the file net.toml pass its links"),
         ("exec net.toml --listen 8080", "Hosts of the file net.toml are reached by each other: expected a client as a further host"),
         ("exec 'delay 1ms' --back 'delay 2ms'", "\"delay 1ms\" is not a file: expected a file of hosts, or a command after two dashes"),
         ("exec '' -- true", "an empty text is no link: expected words such as 'delay 50ms loss 1%'"),
@@ -453,6 +514,10 @@ fn an_ordinary_user_needs_no_root() {
     );
     let outcome = script(&[program, "exec", "delay 5ms", "--no-priority", "--", "bash", "-c", &fetch]);
     assert_eq!((outcome.status, outcome.stdout.as_str()), (Some(0), "65534\n65534\ncohaptic\nhello\npong\n"), "{outcome:?}");
+    // The second question has an answer, and the first is lost: both have taken the link.
+    let ping = ["--loopback", "--lose", "command -> loopback: 0", "--no-priority", "--", "ping", "-c", "2", "-i", "0.2", "localhost"];
+    let outcome = script(&[&[program, "exec", "delay 5ms"][..], &ping].concat());
+    assert!(outcome.status == Some(0) && outcome.stdout.contains("2 packets transmitted, 1 received"), "{outcome:?}");
 }
 
 #[test]

@@ -68,6 +68,7 @@ fn a_search_says_what_is_not_due_to_lost_packets() {
     assert_eq!(outcome.status, Some(3), "{outcome:?}");
     for part in [
         "losing nothing: fails 2 of 2 times\nover ideal links: fails 2 of 2 times\nthe command fails over ideal links too\nno packet has passed a link",
+        "\nwith --loopback, packets of the command to localhost pass a link too. ",
         " as in\n  -- env SERVER=http://host:8000 COMMAND\n",
         "  | spoken\n",
     ] {
@@ -91,6 +92,8 @@ fn a_search_says_what_is_not_due_to_lost_packets() {
     // More losses would find nothing in a command that sends no packet.
     let outcome = desk.cohaptic("exec 'delay 1ms loss 1%' --seeds 1..3 --no-priority -- true");
     assert!(outcome.stdout.contains("the command passes with 3 seeds\nno packet has passed a link"), "{}", outcome.stdout);
+    let outcome = desk.cohaptic("exec 'delay 1ms loss 1%' --loopback --runs 1 --no-priority -- true");
+    assert_eq!(outcome.stdout, "run 1: passes, lost nothing\nthe command passes 1 of 1 times\nno packet has passed a link\n");
 
     let mut command =
         desk.command("exec 'delay 1ms' --runs 100 --no-priority -- sh -c 'echo ready >>said; sleep 0.1; [ $(wc -l <said) -lt 3 ] || sleep 1000'");
@@ -159,6 +162,8 @@ fn wrong_trials_are_refused() {
         ("--runs 0", &["--runs"]),
         ("--until-failure", &["--seeds"]),
         ("--lose 'here -> world: 0'", &["there is no host \"here\" among command, world"]),
+        ("--lose 'command -> loopback: 0'", &["there is no host \"loopback\" among command, world"]),
+        ("--loopback --lose 'world -> loopback: 0'", &["there is no link from world to loopback"]),
     ] {
         let outcome = desk.cohaptic_within(PATIENCE, &format!("exec 'delay 1ms' {options} -- true"));
         assert_eq!(outcome.status, Some(125), "{options}: {outcome:?}");

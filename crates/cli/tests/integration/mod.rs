@@ -25,6 +25,8 @@ mod exec;
 #[cfg(unix)]
 mod exec_hosts;
 #[cfg(unix)]
+mod exec_loopback;
+#[cfg(unix)]
 mod exec_trials;
 mod existing;
 mod explain;

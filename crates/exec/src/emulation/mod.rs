@@ -172,8 +172,8 @@ impl Emulation {
 
     /// Moves departures from the links to the queues of the receivers.
     fn take_departures(&mut self) {
-        while let Some(Departure { at, record, packet }) = self.exchange.poll_departure() {
-            let to = usize::from(record.path.to.0);
+        while let Some(Departure { at, record, to, packet }) = self.exchange.poll_departure() {
+            let to = usize::from(to.0);
             self.capture(to, |capture| capture.write_packet(&record.without_path(), packet.bytes()));
             let leaving = &mut self.leaving[to];
             leaving.at.push(at);

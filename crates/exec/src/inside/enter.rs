@@ -6,7 +6,7 @@ use std::io;
 use std::os::fd::AsFd as _;
 use std::process::{Command, Stdio};
 
-use cohaptic_router::{Failed, Join, Tun, lead_all};
+use cohaptic_router::{Failed, Join, Tun, lead_all, lead_own};
 use nix::sched::{CloneFlags, unshare};
 use rustix::thread::{CapabilitySet, capabilities, configure_capability_in_ambient_set, set_capabilities};
 
@@ -53,6 +53,9 @@ fn begin(setup: &Setup, channel: &Channel, command: &[OsString]) -> Result<std::
     };
     let tun = Tun::open(&device).map_err(step)?;
     lead_all(&device).map_err(step)?;
+    if setup.loopback {
+        lead_own(&device).map_err(|failed| refusal::of_loopback(&failed))?;
+    }
     files::allow_ordinary_users();
     files::name_hosts(setup)?;
     let (descriptor, which) = tun.into_descriptor();

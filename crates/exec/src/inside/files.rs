@@ -1,5 +1,6 @@
 //! Files of a host inside, in place of the machine's: names of hosts, the name server, and settings of the network.
 
+use core::net::{IpAddr, Ipv4Addr};
 use std::fs::{self, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -10,6 +11,8 @@ use super::refusal;
 use super::setup::Setup;
 
 const NONE: Option<&str> = None;
+/// Name of the loopback interface in all systems.
+const LOCALHOST: &str = "localhost";
 
 /// Keeps later mounts of this namespace away from the machine.
 pub(super) fn mount_privately() -> io::Result<()> {
@@ -36,11 +39,36 @@ pub(super) fn name_hosts(setup: &Setup) -> Result<(), String> {
     let v4 = || setup.addresses.iter().map(|network| network.address()).filter(|address| address.is_ipv4());
     let own = setup.name.iter().flat_map(|name| v4().map(move |address| (address, name.clone())));
     let names: Vec<String> = setup.hosts.iter().cloned().chain(own).map(|(address, name)| format!("{address}\t{name}\n")).collect();
+    let own = setup.loopback.then(rustix::system::uname);
+    let own = own.as_ref().map(|system| system.nodename().to_string_lossy());
     // Names of the machine stay known. Names of the network come first, because the first entry of a name counts.
-    replace("/etc/hosts", |text| format!("{}{}", names.concat(), text))?;
+    replace("/etc/hosts", |text| format!("{}{}", names.concat(), own.map_or_else(|| text.to_owned(), |own| names_of_itself(text, &own))))?;
     let server = setup.name_server.map_or_else(String::new, |address| format!("nameserver {address}\n"));
     replace("/etc/resolv.conf", |_| server)?;
     replace("/etc/nsswitch.conf", plain_names)
+}
+
+/// Returns the text of /etc/hosts in which `localhost` and the name of the host stand for addresses of the network 127.0.0.0/8 alone, and `::1` has no name.
+/// A program would speak past the links with `::1`, and with the address that the machine gives its name, which the host does not have.
+fn names_of_itself(text: &str, name: &str) -> String {
+    let mut missing = vec![LOCALHOST, name];
+    missing.dedup();
+    let mut lines = Vec::new();
+    for line in text.lines() {
+        let mut words = line.split('#').next().unwrap_or_default().split_whitespace();
+        // Lines without an address stay, such as comments.
+        let address: Option<IpAddr> = words.next().and_then(|word| word.parse().ok());
+        let names: Vec<&str> = words.collect();
+        let is_own = names.iter().any(|word| [LOCALHOST, name].contains(word));
+        if address.is_some_and(|address| address.is_ipv6() && (is_own || address.is_loopback())) {
+            continue;
+        }
+        missing.retain(|word| address.is_none() || !names.contains(word));
+        let is_elsewhere = is_own && address.is_some_and(|address| !address.is_loopback());
+        lines.push(if is_elsewhere { format!("{}\t{}\n", Ipv4Addr::LOCALHOST, names.join(" ")) } else { format!("{line}\n") });
+    }
+    let missing = missing.into_iter().map(|name| format!("{}\t{name}\n", Ipv4Addr::LOCALHOST));
+    missing.chain(lines).collect()
 }
 
 /// Returns the text of /etc/nsswitch.conf in which host names come from the files and the name server alone. Other services, such as that of systemd, answer
@@ -94,6 +122,18 @@ mod tests {
     fn host_names_come_from_files_and_the_name_server_alone() {
         let text = "passwd: files systemd\nhosts:          files resolve [!UNAVAIL=return] dns\nservices: db files\n";
         assert_eq!(plain_names(text), "passwd: files systemd\nhosts: files dns\nservices: db files\n");
+    }
+
+    /// Lines of Debian, of Docker, and of a system whose names come from another service.
+    #[test]
+    fn own_names_stand_for_the_loopback_network() {
+        let text = "127.0.0.1 localhost\n127.0.1.1\tvm.example.org vm # the machine\n::1 localhost ip6-localhost\nfe00::0 ip6-localnet\n# end\n";
+        let expected = "127.0.0.1 localhost\n127.0.1.1\tvm.example.org vm # the machine\nfe00::0 ip6-localnet\n# end\n";
+        assert_eq!(names_of_itself(text, "vm"), expected);
+        let text = "::1 localhost\n127.0.0.1 localhost\n172.17.0.2 vm vm.example.org\nfd00::2 vm\n10.0.0.9 other\n";
+        assert_eq!(names_of_itself(text, "vm"), "127.0.0.1 localhost\n127.0.0.1\tvm vm.example.org\n10.0.0.9 other\n");
+        assert_eq!(names_of_itself("# none\n", "vm"), "127.0.0.1\tlocalhost\n127.0.0.1\tvm\n# none\n");
+        assert_eq!(names_of_itself("", "localhost"), "127.0.0.1\tlocalhost\n");
     }
 
     #[test]

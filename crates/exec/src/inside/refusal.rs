@@ -4,6 +4,8 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+use cohaptic_router::Failed;
+
 /// Setting of the system about namespaces of ordinary users.
 struct Setting {
     /// File below `/proc/sys`.
@@ -36,6 +38,14 @@ pub(super) fn words(what: &str, error: &io::Error) -> String {
     ) || error.raw_os_error() == Some(nix::errno::Errno::EINVAL as i32)
         || error.raw_os_error() == Some(nix::errno::Errno::ENOSPC as i32);
     if is_refusal { format!("{refused}\n{}", way_out(Path::new("/proc/sys"))) } else { refused }
+}
+
+/// Returns the words for a kernel that does not lead packets of a host to itself into a device, with the way out.
+pub(super) fn of_loopback(failed: &Failed) -> String {
+    format!(
+        "{failed}\n--loopback needs a kernel with several tables of routes (CONFIG_IP_MULTIPLE_TABLES); without --loopback, the command reaches a server that \
+        is started beside it by the name host"
+    )
 }
 
 /// Returns the settings under `folder` that forbid namespaces, each with the command to allow namespaces, and an alternative without namespaces.

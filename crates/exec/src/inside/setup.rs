@@ -18,6 +18,9 @@ pub struct Setup {
     pub hosts: Vec<(IpAddr, String)>,
     /// Name server in `/etc/resolv.conf`, or `None` for none.
     pub name_server: Option<IpAddr>,
+    /// `true` if packets of the host to its own addresses of IPv4, such as 127.0.0.1, pass links: see [`Plan::loopback`](crate::Plan::loopback). The host then
+    /// has no `::1`.
+    pub loopback: bool,
 }
 
 impl Setup {
@@ -27,7 +30,8 @@ impl Setup {
         let addresses = self.addresses.iter().map(|address| format!("address {address}"));
         let hosts = self.hosts.iter().map(|(address, name)| format!("host {address} {name}"));
         let server = self.name_server.iter().map(|address| format!("server {address}"));
-        name.chain(addresses).chain(hosts).chain(server).collect::<Vec<_>>().join("\n")
+        let loopback = self.loopback.then(|| "loopback".to_owned());
+        name.chain(addresses).chain(hosts).chain(server).chain(loopback).collect::<Vec<_>>().join("\n")
     }
 
     /// Reads the text of a setup. Returns `None` for any other text.
@@ -39,6 +43,7 @@ impl Setup {
                 ["address", address] => setup.addresses.push(address.parse().ok()?),
                 ["host", address, name] => setup.hosts.push((address.parse().ok()?, (*name).to_owned())),
                 ["server", address] => setup.name_server = Some(address.parse().ok()?),
+                ["loopback"] => setup.loopback = true,
                 _ => return None,
             }
         }
@@ -70,6 +75,7 @@ mod tests {
             addresses: vec!["10.0.2.15/24".parse().unwrap(), "fd00::15/64".parse().unwrap()],
             hosts: vec![(address("10.0.2.2"), "host".to_owned())],
             name_server: Some(address("10.0.2.3")),
+            loopback: true,
         };
         assert_eq!(Setup::of_text(&setup.to_text()), Some(setup.clone()));
         assert_eq!(Setup::of_text(""), Some(Setup::default()));

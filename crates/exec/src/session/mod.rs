@@ -37,7 +37,7 @@ pub struct Plan {
     pub hosts: Vec<HostPlan>,
     /// Way to the real world, or `None` for none.
     pub gateway: Option<GatewayPlan>,
-    /// Links between the nodes: the hosts, and the gateway after them if there is one.
+    /// Links between the nodes, in the order of [`Plan::nodes`].
     pub links: LinkTable,
     /// Way in which the thread of the network waits.
     pub pacing: Pacing,
@@ -77,6 +77,34 @@ pub struct GatewayPlan {
     pub listen: Vec<SocketAddr>,
 }
 
+/// Name of the node of [`Plan::loopback`], by which links name the node.
+const LOOPBACK: &str = "loopback";
+
+impl Plan {
+    /// Returns the index of the host whose packets to itself pass links: the first host with [`Setup::loopback`]. The last node of the network stands for the
+    /// servers of this host. Packets of clients pass the link from the host to this node, and packets of servers the link back.
+    #[must_use]
+    pub fn loopback(&self) -> Option<usize> {
+        self.hosts.iter().position(|host| host.setup.loopback)
+    }
+
+    /// Returns the names of the nodes: the hosts, then the gateway if there is one, then the loopback if there is one.
+    #[must_use]
+    pub fn nodes(&self) -> Vec<&str> {
+        let gateway = self.gateway.iter().map(|gateway| gateway.name.as_str());
+        self.hosts.iter().map(|host| host.name.as_str()).chain(gateway).chain(self.loopback().map(|_| LOOPBACK)).collect()
+    }
+
+    /// Returns whether packets can pass a link from one node to another, by their indices. A node has no link to itself, and a loopback has links from and to
+    /// its host alone.
+    #[must_use]
+    pub fn has_link(&self, from: usize, to: usize) -> bool {
+        let nodes = self.nodes().len();
+        let is_apart = |one, other| self.loopback().is_some_and(|host| one + 1 == nodes && other != host);
+        from != to && from < nodes && to < nodes && !is_apart(from, to) && !is_apart(to, from)
+    }
+}
+
 /// Result of a run.
 #[derive(Debug)]
 pub struct Outcome {
@@ -110,11 +138,11 @@ pub struct Report {
     pub elapsed: Duration,
     /// Counters of each link, by sender and receiver.
     pub links: Vec<LinkReport>,
-    /// Names of the hosts, and of the gateway.
+    /// Names of the nodes, as by [`Plan::nodes`].
     pub nodes: Vec<String>,
     /// Packets not taken by any link.
     pub untaken: Counts,
-    /// Packets refused by the device of each node, or by the gateway, indexed by node.
+    /// Packets refused by the device of each host, or by the gateway, indexed by node. A loopback refuses nothing, and has no number.
     pub refused: Vec<u64>,
     /// Lateness of the packets.
     pub release: LatenessSummary,
@@ -145,13 +173,16 @@ pub fn run(plan: &Plan, hear: &(dyn Fn(Line<'_>) + Sync)) -> Result<Outcome, Fai
     for (host, of) in hosts.iter().zip(&plan.hosts) {
         ports.push(Port::Device(host.device().map_err(|failed| named(plan, of, failed))?));
     }
-    let mut nodes: Vec<Node> = plan.hosts.iter().map(node).collect();
     if let Some(gateway) = &plan.gateway {
         ports.push(Port::Gateway(Box::new(open(gateway)?)));
-        nodes.push(Node { name: gateway.name.clone(), addresses: Vec::new() });
     }
+    let nodes: Vec<Node> = plan.nodes().into_iter().enumerate().map(|(place, name)| node(plan, place, name)).collect();
     let gateway = plan.gateway.as_ref().map(|_| plan.hosts.len());
     let exchange = Exchange::new(plan.seed, &nodes, gateway, |from, to| plan.links.between(from, to).clone());
+    let exchange = match plan.loopback() {
+        Some(host) => exchange.with_loopback(host, nodes.len() - 1),
+        None => exchange,
+    };
     let captures = nodes.iter().enumerate().map(|(place, node)| capture(plan, place, node)).collect::<Result<_, _>>()?;
     let (mut emulation, stop) =
         Emulation::new(exchange, ports, captures).map_err(|error| Failed::own(format!("cannot make the network: {error}")))?;
@@ -188,8 +219,10 @@ fn named(plan: &Plan, host: &HostPlan, failed: Failed) -> Failed {
     if plan.hosts.len() < 2 { failed } else { Failed { why: format!("host {}: {}", host.name, failed.why), ..failed } }
 }
 
-fn node(host: &HostPlan) -> Node {
-    Node { name: host.name.clone(), addresses: host.setup.addresses.iter().map(|network| network.address()).collect() }
+/// Returns a node of the network. Gateway and loopback have no addresses of their own.
+fn node(plan: &Plan, place: usize, name: &str) -> Node {
+    let networks = plan.hosts.get(place).map_or(&[][..], |host| &host.setup.addresses);
+    Node { name: name.to_owned(), addresses: networks.iter().map(|network| network.address()).collect() }
 }
 
 fn open(plan: &GatewayPlan) -> Result<Gateway, Failed> {
@@ -218,7 +251,7 @@ fn report(plan: &Plan, emulation: &mut Emulation, prepared: Prepared) -> Report 
     let capture_error = emulation.finish_captures().map(|error| error.to_string());
     let exchange = emulation.exchange();
     let nodes = exchange.names().to_vec();
-    let pairs = (0..nodes.len()).flat_map(|from| (0..nodes.len()).map(move |to| (from, to)));
+    let pairs = (0..nodes.len()).flat_map(|from| (0..nodes.len()).map(move |to| (from, to))).filter(|(from, to)| plan.has_link(*from, *to));
     let link = |(from, to)| {
         let (sender, receiver) = (NodeId::new(from), NodeId::new(to));
         Some(LinkReport { from, to, stats: exchange.link_stats(sender, receiver)?, dropped: exchange.dropped(sender, receiver).to_vec() })

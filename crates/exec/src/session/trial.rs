@@ -10,12 +10,6 @@ use crate::lost::{LostPacket, LostPackets};
 use crate::search::Trial;
 
 impl Plan {
-    /// Returns the names of the hosts and of the gateway, indexed by node.
-    #[must_use]
-    pub fn nodes(&self) -> Vec<&str> {
-        self.hosts.iter().map(|host| host.name.as_str()).chain(self.gateway.iter().map(|gateway| gateway.name.as_str())).collect()
-    }
-
     /// Returns the plan of a trial.
     #[must_use]
     pub fn of_trial(&self, trial: Trial<'_>) -> Self {
@@ -63,22 +57,52 @@ mod tests {
 
     use super::*;
     use crate::search::Case;
+    use crate::{GatewayPlan, HostPlan, Output, Setup};
+
+    /// A loopback is linked with its host, and not with the world.
+    #[test]
+    fn a_loopback_is_linked_with_its_host_alone() {
+        let host = |loopback| HostPlan {
+            name: "command".to_owned(),
+            setup: Setup { loopback, ..Setup::default() },
+            command: Vec::new(),
+            is_main: true,
+            ready: None,
+            output: Output::Lines,
+        };
+        let plan = |loopback| Plan {
+            hosts: vec![host(loopback)],
+            gateway: Some(GatewayPlan { name: "world".to_owned(), name_server: None, listen: Vec::new() }),
+            links: LinkTable::uniform(3, LinkModel::default()),
+            ..empty()
+        };
+        let linked = |plan: &Plan| {
+            let pairs = (0..4).flat_map(|from| (0..4).map(move |to| (from, to)));
+            pairs.filter(|(from, to)| plan.has_link(*from, *to)).collect::<Vec<_>>()
+        };
+        assert_eq!((plan(true).nodes(), linked(&plan(true))), (vec!["command", "world", "loopback"], vec![(0, 1), (0, 2), (1, 0), (2, 0)]));
+        assert_eq!((plan(false).nodes(), linked(&plan(false))), (vec!["command", "world"], vec![(0, 1), (1, 0)]));
+    }
+
+    fn empty() -> Plan {
+        Plan {
+            seed: 1,
+            hosts: Vec::new(),
+            gateway: None,
+            links: LinkTable::uniform(2, LinkModel::default()),
+            pacing: Pacing::Sleep,
+            wishes: Wishes::NONE,
+            tolerance: Tolerance { limit: Duration::from_millis(1) },
+            captures: None,
+        }
+    }
 
     /// Chosen losses stand in the place of losses by chance, and all else of each link stays.
     #[test]
     fn a_trial_changes_losses_and_seed_alone() {
         let link = |keys: &[&str]| link_from_keys(&keys.iter().map(|key| (*key).to_owned()).collect::<Vec<_>>()).unwrap();
         let (there, back) = (link(&["delay=5ms", "loss=50%"]), link(&["delay=6ms", "jitter=1ms", "loss=1%"]));
-        let plan = Plan {
-            seed: 1,
-            hosts: Vec::new(),
-            gateway: None,
-            links: LinkTable::new(2, Arc::new(there.clone()), [((1, 0), Arc::new(back.clone()))]),
-            pacing: Pacing::Sleep,
-            wishes: Wishes::NONE,
-            tolerance: Tolerance { limit: Duration::from_millis(1) },
-            captures: None,
-        };
+        let plan = Plan { links: LinkTable::new(2, Arc::new(there.clone()), [((1, 0), Arc::new(back.clone()))]), ..empty() };
         let lost: LostPackets = [LostPacket { from: 0, to: 1, number: 3 }].into_iter().collect();
         let case = plan.of_trial(Trial::Case(&Case { seed: 9, lost: lost.clone() }));
         assert_eq!(
