@@ -37,6 +37,7 @@ impl Scoreboard {
     ///
     /// Returns the instant at which all other segments sent before `delivered` are lost, or `None` if no other segment is left.
     pub(crate) fn detect_by_time(&mut self, now: Instant, delivered: SentAt, patience: Duration) -> Option<Instant> {
+        self.keep_times();
         while let Some(&(sent_at, start)) = self.by_time.front() {
             let index = self.index(start).filter(|index| self.is_undecided(*index, sent_at));
             if let Some(index) = index {
@@ -119,6 +120,6 @@ impl Scoreboard {
         // Loss detection has dropped the entries of lost segments from `by_time`. All segments on the way need an entry again.
         let mut by_time: Vec<_> = self.queue.iter().filter(|sent| !sent.sacked).map(|sent| ((sent.at, sent.order), sent.start)).collect();
         by_time.sort_unstable();
-        self.by_time = by_time.into();
+        (self.by_time, self.keeps_times) = (by_time.into(), true);
     }
 }

@@ -54,8 +54,10 @@ pub(crate) struct Scoreboard {
     /// Segments in the order of positions. Each segment begins where the segment before ends.
     queue: VecDeque<Sent>,
     /// Transmissions in the order of time, with the start of their segment. An entry stays after its segment was sent again or has arrived; readers skip old
-    /// entries.
+    /// entries. Empty unless `keeps_times` is set.
     by_time: VecDeque<(SentAt, Position)>,
+    /// `false` as long as `by_time` would have one entry for each segment of `queue`, in the order of `queue`, as in a transfer without losses.
+    keeps_times: bool,
     /// Starts of the lost segments that wait to be sent again.
     to_send: BTreeSet<Position>,
     /// Positions that have arrived out of order, as the receiver has told.
@@ -107,10 +109,20 @@ impl Scoreboard {
         if self.queue.capacity() == 0 {
             // Most flights have ten segments or more.
             self.queue.reserve(FIRST);
-            self.by_time.reserve(FIRST);
         }
-        self.by_time.push_back(((at, order), start));
+        if self.keeps_times {
+            self.by_time.push_back(((at, order), start));
+        }
         self.queue.push_back(Sent { start, end, at, order, sacked: false, lost: false, again: false, ever_again: false, ending });
+    }
+
+    /// Fills `by_time`, unless `by_time` is filled already. Called before a search by time, and before the order of transmissions or the start of a segment
+    /// changes.
+    fn keep_times(&mut self) {
+        if !self.keeps_times {
+            self.keeps_times = true;
+            self.by_time.extend(self.queue.iter().map(|sent| ((sent.at, sent.order), sent.start)));
+        }
     }
 
     /// Returns the index in `queue` of the segment that contains `start`.
@@ -147,7 +159,7 @@ impl Scoreboard {
             }
         }
         self.sacked.remove_below(position);
-        let Some(first) = self.queue.front_mut() else {
+        let Some(first) = self.queue.front() else {
             // Nothing is on the way. The memory of the queues is released, because an idle connection is to be small.
             *self = Self { transmissions: self.transmissions, losses: self.losses, ..Self::default() };
             return;
@@ -156,13 +168,21 @@ impl Scoreboard {
         while self.by_time.front().is_some_and(|(_, start)| *start < first.start) {
             self.by_time.pop_front();
         }
-        // The acknowledgement ends inside the segment: the rest of the segment remains, and `to_send` is keyed by its start.
         if first.start < position {
-            if self.to_send.remove(&first.start) {
-                self.to_send.insert(position);
-            }
-            first.start = position;
+            self.cut_first(position);
         }
+    }
+
+    /// Removes the octets below `position` from the first segment, because an acknowledgement ends inside the segment.
+    #[cold]
+    fn cut_first(&mut self, position: Position) {
+        self.keep_times();
+        let Some(first) = self.queue.front_mut() else { return };
+        // `to_send` is keyed by the start of the segment.
+        if self.to_send.remove(&first.start) {
+            self.to_send.insert(position);
+        }
+        first.start = position;
     }
 
     /// Notes that all positions from `start` to `end` (exclusive) have arrived (RFC 2018), and adds the segments to `news`. A segment counts as arrived only if
@@ -231,6 +251,7 @@ impl Scoreboard {
     /// transmission is on the way beside the lost transmission. A probe does not count.
     pub(crate) fn sent_again(&mut self, start: Position, at: Instant, counts: bool) {
         let Some(index) = self.index(start) else { return };
+        self.keep_times();
         self.transmissions += 1;
         let sent = &mut self.queue[index];
         (sent.at, sent.order, sent.ever_again) = (at, self.transmissions, true);
