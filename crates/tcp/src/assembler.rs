@@ -7,6 +7,7 @@ use bytes::{Buf, Bytes};
 
 use crate::memory;
 use crate::ranges::Ranges;
+use crate::segment::Payload;
 use crate::sequence::Position;
 
 /// Entries up to which an empty queue keeps its memory.
@@ -16,7 +17,7 @@ const KEPT: usize = 16;
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Assembler {
     /// Octets in order, not yet read by the program, as they arrived. No piece is empty.
-    ready: VecDeque<Bytes>,
+    ready: VecDeque<Piece>,
     /// Number of octets in `ready`.
     unread: usize,
     /// Data out of order, by the position of its first octet.
@@ -25,13 +26,11 @@ pub(crate) struct Assembler {
     waiting: usize,
     /// Memory that the pieces take in Linux \[byte\].
     waiting_memory: usize,
-    /// Segments of the octets in order, with their memory.
-    segments: VecDeque<Held>,
-    /// Memory of `segments` \[byte\].
+    /// Memory that the octets in order take in Linux \[byte\].
     ready_memory: usize,
     /// Greatest length of `ready` since the program last read everything.
     longest: usize,
-    /// Value of `longest` when the memory of the queues was last released.
+    /// Value of `longest` when the memory of the queue was last released.
     expected: usize,
     /// Positions of the octets in `pieces`, with neighbouring pieces joined to one range.
     ranges: Ranges,
@@ -39,15 +38,50 @@ pub(crate) struct Assembler {
     recent: Vec<Position>,
 }
 
-/// Memory of unread octets in order.
-#[derive(Clone, Copy, Debug)]
-struct Held {
+/// Unread octets in order, of one segment, or of several segments of one length that follow each other in memory.
+#[derive(Clone, Debug)]
+struct Piece {
+    /// Memory that begins with the octets. Octets that have not arrived may follow.
+    memory: Bytes,
     /// Number of unread octets.
-    octets: usize,
-    /// Memory that is free once all octets were read \[byte\].
-    memory: usize,
-    /// Octets of later data that the same memory takes.
+    unread: usize,
+    /// Octets of each segment. Zero if the segment shares the cost of the piece before.
+    size: usize,
+    /// Number of segments with unread octets.
+    count: usize,
+    /// Octets of the first of these segments that were read.
+    begun: usize,
+    /// Memory in Linux of each segment but the last \[byte\], free once all octets of the segment were read.
+    cost: usize,
+    /// Memory in Linux of the last segment \[byte\]. Short segments share memory, which counts for the last one of them.
+    last_cost: usize,
+    /// Octets of later data that the memory of the last segment takes.
     room: usize,
+}
+
+impl Piece {
+    /// Returns whether `data` is a segment of the same length as the segments of the piece, and follows in the same memory.
+    fn goes_on_with(&self, data: &[u8]) -> bool {
+        // The piece refers to the memory, so that equal addresses mean the same octets.
+        data.len() == self.size
+            && self.room < data.len()
+            && self.memory.len() - self.unread >= data.len()
+            && self.memory[self.unread..].as_ptr() == data.as_ptr()
+    }
+
+    /// Removes octets that were read, but not all. Returns the memory in Linux that is free then \[byte\].
+    fn advance(&mut self, count: usize) -> usize {
+        self.memory.advance(count);
+        self.unread -= count;
+        self.begun += count;
+        if self.count == 1 {
+            return 0;
+        }
+        let whole = self.begun / self.size;
+        self.begun -= whole * self.size;
+        self.count -= whole;
+        whole * self.cost
+    }
 }
 
 impl Assembler {
@@ -74,7 +108,8 @@ impl Assembler {
         }
         let known = offset(*next);
         data.advance(known);
-        self.hold(data);
+        let length = data.len();
+        self.hold(data, length);
         *next = end;
         if !self.ranges.is_empty() {
             self.join(next);
@@ -87,26 +122,39 @@ impl Assembler {
         self.remember(position);
     }
 
-    /// Appends octets in order. Short data may fit into the memory of the segment before.
-    fn hold(&mut self, data: Bytes) {
-        let octets = data.len();
+    /// Appends the data of a segment that begins at the first missing octet. No data may wait out of order.
+    pub(crate) fn append(&mut self, data: &mut Payload<'_>) {
+        let length = data.len();
+        if let Some(last) = self.ready.back_mut().filter(|last| last.goes_on_with(data)) {
+            last.unread += length;
+            last.count += 1;
+            self.ready_memory += last.cost;
+            self.unread += length;
+            return;
+        }
+        self.hold(data.take_memory(), length);
+    }
+
+    /// Appends the first `length` octets of `memory`, which are in order. Short data may fit into the memory of the segment before.
+    fn hold(&mut self, memory: Bytes, length: usize) {
+        if length == 0 {
+            return;
+        }
         if self.ready.capacity() == 0 {
-            // The next flight mostly has as many segments as the last flight or twice as many, and growing piece by piece would copy the queues each time.
+            // The next flight mostly has as many pieces as the last flight or twice as many, and growing piece by piece would copy the queue each time.
             self.ready.reserve(self.expected);
-            self.segments.reserve(self.expected);
         }
-        if let Some(last) = self.segments.back_mut().filter(|last| last.room >= octets) {
-            (last.octets, last.room) = (last.octets + octets, last.room - octets);
-        } else {
-            let (memory, room) = memory::of_received(octets);
-            self.segments.push_back(Held { octets, memory, room });
-            self.ready_memory += memory;
-        }
-        if octets > 0 {
-            self.unread += octets;
-            self.ready.push_back(data);
-            self.longest = self.longest.max(self.ready.len());
-        }
+        let (size, cost, room) = match self.ready.back_mut().filter(|last| last.room >= length) {
+            Some(last) => (0, core::mem::take(&mut last.last_cost), core::mem::take(&mut last.room) - length),
+            None => {
+                let (cost, room) = memory::of_received(length);
+                self.ready_memory += cost;
+                (length, cost, room)
+            }
+        };
+        self.unread += length;
+        self.ready.push_back(Piece { memory, unread: length, size, count: 1, begun: 0, cost, last_cost: cost, room });
+        self.longest = self.longest.max(self.ready.len());
     }
 
     /// Moves the pieces from `next` up to the first gap to the octets in order.
@@ -119,7 +167,8 @@ impl Assembler {
             let known = usize::try_from(*next - start).map_or(piece.len(), |known| known.min(piece.len()));
             *next += (piece.len() - known) as u64;
             piece.advance(known);
-            self.hold(piece);
+            let length = piece.len();
+            self.hold(piece, length);
         }
         self.ranges.remove_below(*next);
         if self.ranges.is_empty() {
@@ -173,13 +222,13 @@ impl Assembler {
     /// Copies octets in order into `to` and keeps the octets. Returns the number of octets.
     pub(crate) fn peek(&self, to: &mut [u8]) -> usize {
         let mut count = 0;
-        for piece in &self.ready {
+        for Piece { memory, unread, .. } in &self.ready {
             let room = &mut to[count..];
             if room.is_empty() {
                 break;
             }
-            let taken = piece.len().min(room.len());
-            room[..taken].copy_from_slice(&piece[..taken]);
+            let taken = room.len().min(*unread);
+            room[..taken].copy_from_slice(&memory[..taken]);
             count += taken;
         }
         count
@@ -191,29 +240,19 @@ impl Assembler {
         self.unread -= count;
         let mut left = count;
         while let Some(first) = self.ready.front_mut().filter(|_| left > 0) {
-            let taken = left.min(first.len());
-            left -= taken;
-            if taken == first.len() {
-                self.ready.pop_front();
-            } else {
-                first.advance(taken);
+            if left < first.unread {
+                self.ready_memory -= first.advance(left);
+                break;
             }
-        }
-        let mut left = count;
-        while let Some(first) = self.segments.front_mut().filter(|first| left > 0 || first.octets == 0) {
-            let taken = left.min(first.octets);
-            (first.octets, left) = (first.octets - taken, left - taken);
-            // The memory of a segment is free once all of its octets were read.
-            if first.octets == 0 {
-                self.ready_memory -= first.memory;
-                self.segments.pop_front();
-            }
+            left -= first.unread;
+            self.ready_memory -= (first.count - 1) * first.cost + first.last_cost;
+            self.ready.pop_front();
         }
         if self.unread == 0 {
             let longest = core::mem::take(&mut self.longest);
             // An empty queue keeps its capacity, and an idle connection is to be small.
-            if self.ready.capacity().max(self.segments.capacity()) > KEPT {
-                (self.ready, self.segments, self.expected) = (VecDeque::new(), VecDeque::new(), longest);
+            if self.ready.capacity() > KEPT {
+                (self.ready, self.expected) = (VecDeque::new(), longest);
             }
         }
         count

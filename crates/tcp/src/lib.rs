@@ -45,6 +45,7 @@ mod config;
 mod congestion;
 mod connection;
 mod error;
+mod flight;
 mod info;
 mod memory;
 mod pace;
@@ -59,6 +60,7 @@ mod tuning;
 pub use config::{ConfigError, CongestionControl, EcnFallback, Keepalive, TcpConfig};
 pub use connection::Connection;
 pub use error::Error;
+pub use flight::Flight;
 pub use info::{CaState, Info, State};
 pub use segment::{Ecn, Flags, Options, ParseError, Payload, SackBlocks, Segment};
 

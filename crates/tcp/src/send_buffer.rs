@@ -55,31 +55,28 @@ impl SendBuffer {
         self.end
     }
 
-    /// Returns the octets from `start` to `end` (exclusive). Positions outside the buffer are left out. Only octets of several writes are copied.
-    pub(crate) fn slice(&mut self, start: Position, end: Position) -> Bytes {
+    /// Returns the octets from `start` to `end` (exclusive), and the number of these octets. Positions outside the buffer are left out. Further octets may
+    /// follow in the same memory. Only octets of several writes are copied.
+    pub(crate) fn slice(&mut self, start: Position, end: Position) -> (Bytes, usize) {
         let (start, end) = (start.max(self.start), end.min(self.end));
         if start >= end {
-            return Bytes::new();
+            return (Bytes::new(), 0);
         }
         if end > self.end - self.tail.len() as u64 {
             self.share_tail();
         }
+        let length = usize::try_from(end - start).unwrap_or(usize::MAX);
         // The pieces follow each other without gaps.
         let index = self.pieces.partition_point(|(at, piece)| at + piece.len() as u64 <= start);
-        let part = |(at, piece): &(Position, Bytes)| {
-            let offset = |position: Position| usize::try_from(position.saturating_sub(*at)).unwrap_or(usize::MAX).min(piece.len());
-            piece.slice(offset(start)..offset(end))
-        };
-        let first = self.pieces.get(index).map(part).unwrap_or_default();
-        let length = usize::try_from(end - start).unwrap_or(usize::MAX);
-        if first.len() == length {
-            return first;
+        let offset = |at: Position, position: Position| usize::try_from(position.saturating_sub(at)).unwrap_or(usize::MAX);
+        if let Some((at, piece)) = self.pieces.get(index).filter(|(at, piece)| end <= at + piece.len() as u64) {
+            return (piece.slice(offset(*at, start)..), length);
         }
         let mut copy = Vec::with_capacity(length);
-        for piece in self.pieces.range(index..).take_while(|(at, _)| *at < end) {
-            copy.extend_from_slice(&part(piece));
+        for (at, piece) in self.pieces.range(index..).take_while(|(at, _)| *at < end) {
+            copy.extend_from_slice(&piece[offset(*at, start)..offset(*at, end).min(piece.len())]);
         }
-        copy.into()
+        (copy.into(), length)
     }
 
     /// Removes the octets below `position`.
@@ -104,6 +101,11 @@ impl SendBuffer {
 mod tests {
     use super::*;
 
+    fn slice(buffer: &mut SendBuffer, start: Position, end: Position) -> Bytes {
+        let (octets, length) = buffer.slice(start, end);
+        octets.slice(..length)
+    }
+
     #[test]
     fn segments_of_several_writes_are_whole() {
         let mut buffer = SendBuffer::new(100);
@@ -114,13 +116,14 @@ mod tests {
             let written: Vec<u8> = (0..5).map(|k| u8::try_from((256 + step * 5 + k) % 256).unwrap()).collect();
             buffer.write(&written);
             let start = 105 + step * 5;
-            let all = buffer.slice(start, buffer.end());
+            let end = buffer.end();
+            let all = slice(&mut buffer, start, end);
             assert_eq!(all.len(), 256);
             assert!((start - 100..).zip(&all).all(|(at, octet)| u64::from(*octet) == at % 256));
-            assert_eq!(buffer.slice(start + 3, start + 9), all[3..9]);
+            assert_eq!(slice(&mut buffer, start + 3, start + 9), all[3..9]);
         }
         buffer.clear();
-        assert_eq!((buffer.len(), buffer.slice(0, u64::MAX).len()), (0, 0));
+        assert_eq!((buffer.len(), slice(&mut buffer, 0, u64::MAX).len()), (0, 0));
     }
 
     /// Short writes share a piece of memory, and segments within a piece copy nothing.
@@ -130,11 +133,11 @@ mod tests {
         for octet in 0..100 {
             buffer.write(&[octet]);
         }
-        let whole = buffer.slice(0, 100);
-        let part = buffer.slice(10, 20);
+        let whole = slice(&mut buffer, 0, 100);
+        let part = slice(&mut buffer, 10, 20);
         assert_eq!((part.as_ptr(), part[0]), (whole[10..].as_ptr(), 10));
         // A later write does not change what was shared.
         buffer.write(&[100]);
-        assert_eq!((buffer.slice(99, 101), whole.len()), (Bytes::from_static(&[99, 100]), 100));
+        assert_eq!((slice(&mut buffer, 99, 101), whole.len()), (Bytes::from_static(&[99, 100]), 100));
     }
 }

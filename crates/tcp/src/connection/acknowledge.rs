@@ -92,7 +92,7 @@ impl Connection {
 
     /// Takes over the timestamp to echo from a segment that contains the last acknowledged position, so that a delayed acknowledgement counts into the round
     /// trip (RFC 7323, section 4.3). The acknowledgement of the segment must be valid and not overtaken: a forged timestamp would make all later segments old.
-    fn learn_timestamp(&mut self, now: Instant, segment: &Segment<'_>, start: Position, position: Position) {
+    pub(super) fn learn_timestamp(&mut self, now: Instant, segment: &Segment<'_>, start: Position, position: Position) {
         if let (Some((value, _)), true) = (segment.options.timestamps, self.receive.has_timestamps)
             && start <= self.receive.acked
             && position >= self.send.una
@@ -112,7 +112,7 @@ impl Connection {
     }
 
     /// Takes over the window that the segment offers (RFC 9293, section 3.10.7.4). Returns whether the window has changed.
-    fn learn_window(&mut self, segment: &Segment<'_>, start: Position, has_advanced: bool) -> bool {
+    pub(super) fn learn_window(&mut self, segment: &Segment<'_>, start: Position, has_advanced: bool) -> bool {
         let window = u64::from(segment.window) << self.send.scale;
         // An overtaken segment has an old window. Among segments from the same position with the same acknowledgement, only a larger window is sure to be
         // newer.

@@ -4,6 +4,7 @@ use cohaptic_units::Instant;
 
 use super::Connection;
 use crate::config::EcnFallback;
+use crate::flight::Flight;
 use crate::info::State;
 use crate::segment::{Ecn, Flags, Options, Payload, SackBlocks, Segment, TIMESTAMPS_LENGTH};
 use crate::sequence::{Position, on_wire};
@@ -27,7 +28,7 @@ impl Connection {
             // An answer may have a window scale only if the peer's SYN has one. `learn_syn` sets the receive scale to zero otherwise.
             window_scale: (!has_come || self.receive.scale > 0 || self.send.scale > 0).then_some(self.receive.scale),
             sack_permitted: self.receive.has_sack,
-            timestamps: self.receive.has_timestamps.then(|| (Self::ticks(now), self.receive.recent.map_or(0, |(value, _)| value))),
+            timestamps: self.timestamps(now),
             sack: SackBlocks::default(),
         };
         let flags = if has_come {
@@ -92,40 +93,80 @@ impl Connection {
     /// Returns a segment with this content.
     pub(super) fn build(&mut self, now: Instant, content: Content) -> Segment<'static> {
         let mut segment = self.empty(Flags::NONE);
-        self.write_segment(now, content, &mut segment);
+        let window = self.offer_window();
+        self.write_segment(now, content, window, &mut segment);
         segment
     }
 
-    /// Writes a segment with this content over `segment`. The segment acknowledges all octets that have arrived in order, so that no further acknowledgement is
-    /// due afterwards.
-    pub(super) fn write_segment(&mut self, now: Instant, Content { start, end, flags, ecn }: Content, segment: &mut Segment<'static>) {
+    /// Appends a segment with this content to `flight`.
+    pub(super) fn append(&mut self, now: Instant, content: Content, flight: &mut Flight) {
+        let window = self.offer_window();
+        if let Some(run) = flight.last()
+            && self.is_alike(now, &content, window, &run.segment)
+        {
+            let size = usize::try_from(content.end - content.start).unwrap_or(usize::MAX);
+            if run.may_append(on_wire(content.start), size) {
+                run.append(size, content.flags.has(Flags::PSH));
+                return self.has_acknowledged();
+            }
+        }
+        let run = flight.begin();
+        self.write_segment(now, content, window, &mut run.segment);
+        run.begin();
+    }
+
+    /// Returns whether a segment with this content has the same header as the segment before, but for the sequence number and PSH.
+    fn is_alike(&self, now: Instant, content: &Content, window: u16, before: &Segment<'_>) -> bool {
+        let is_plain = content.flags.without(Flags::PSH) == Flags::NONE && before.flags.without(Flags::PSH) == Flags::ACK;
+        let tells_nothing = !self.send.tells_mark && !self.send.tells_reduction && !self.has_blocks() && before.options.sack.as_slice().is_empty();
+        is_plain
+            && tells_nothing
+            && before.acknowledgement == on_wire(self.receive.next)
+            && before.window == window
+            && before.options.timestamps == self.timestamps(now)
+            && (before.ecn, before.ttl) == (content.ecn, self.config.ttl)
+    }
+
+    /// Writes a segment with this content over `segment`. The memory of the data goes on if the send buffer has further octets there. The segment acknowledges
+    /// all octets that have arrived in order, so that no further acknowledgement is due afterwards.
+    fn write_segment(&mut self, now: Instant, Content { start, end, flags, ecn }: Content, window: u16, segment: &mut Segment<'static>) {
         // The FIN has the position after the last octet, so a position beyond the buffer is the FIN.
         let data_end = end.min(self.send.buffer.end()).max(start);
-        let payload = self.send.buffer.slice(start, data_end);
+        let (memory, length) = self.send.buffer.slice(start, data_end);
         let has_fin = end > data_end;
         segment.flags = (Flags::ACK | flags)
             .with_if(Flags::FIN, has_fin)
             .with_if(Flags::ECE, self.send.tells_mark)
-            .with_if(Flags::CWR, self.send.tells_reduction && !payload.is_empty());
+            .with_if(Flags::CWR, self.send.tells_reduction && length > 0);
         // CWR travels once, with data (RFC 3168, section 6.1.2).
-        if !payload.is_empty() {
+        if length > 0 {
             self.send.tells_reduction = false;
         }
-        segment.options = self.options(now, payload.len());
-        segment.window = self.offer_window();
+        segment.options = self.options(now, length);
+        segment.window = window;
         self.has_acknowledged();
         // Field by field, because a segment that is built elsewhere and moved takes longer than the rest of this function.
         (segment.source, segment.destination) = (self.local, self.remote);
         (segment.sequence, segment.acknowledgement) = (on_wire(start), on_wire(self.receive.next));
         (segment.ecn, segment.ttl) = (ecn, self.config.ttl);
-        segment.payload = payload.into();
+        segment.payload = Payload::first_of(memory, length);
+    }
+
+    /// Returns the timestamps of the segments that leave at `now`.
+    fn timestamps(&self, now: Instant) -> Option<(u32, u32)> {
+        self.receive.has_timestamps.then(|| (Self::ticks(now), self.receive.recent.map_or(0, |(value, _)| value)))
+    }
+
+    /// Returns whether the next segment has selective acknowledgements, if there is room.
+    fn has_blocks(&self) -> bool {
+        self.receive.has_sack && (self.receive.duplicate.is_some() || self.receive.assembler.has_gaps())
     }
 
     /// Returns timestamps, and as many selective acknowledgements as fit beside `payload` octets of data.
     fn options(&mut self, now: Instant, payload: usize) -> Options {
-        let timestamps = self.receive.has_timestamps.then(|| (Self::ticks(now), self.receive.recent.map_or(0, |(value, _)| value)));
+        let timestamps = self.timestamps(now);
         let mut sack = SackBlocks::default();
-        if self.receive.has_sack && (self.receive.duplicate.is_some() || self.receive.assembler.has_gaps()) {
+        if self.has_blocks() {
             let taken = payload + if timestamps.is_some() { TIMESTAMPS_LENGTH } else { 0 };
             let room = self.config.segment_room(self.local.is_ipv4()).saturating_sub(taken);
             for (start, end) in self.blocks() {

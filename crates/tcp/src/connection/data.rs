@@ -43,7 +43,7 @@ impl Connection {
                 self.receive.assembler.insert_fin(data_end);
             }
         }
-        self.accept_octets(now, start, end, core::mem::take(&mut segment.payload));
+        self.accept_octets(now, start, end, &mut segment.payload);
         if self.receive.fin == Some(self.receive.next) && !self.receive.is_ended {
             self.end_of_data(now);
         }
@@ -51,7 +51,7 @@ impl Connection {
     }
 
     /// Takes in the octets of `payload` from `start` to `end`, and notes which of them are duplicates. `payload` may be longer: the rest was cut off.
-    fn accept_octets(&mut self, now: Instant, start: Position, end: Position, payload: Payload<'_>) {
+    fn accept_octets(&mut self, now: Instant, start: Position, end: Position, payload: &mut Payload<'_>) {
         if start < self.receive.next {
             self.tell_duplicate(start, self.receive.next.min(end));
         } else if self.receive.assembler.has_gaps()
@@ -65,7 +65,7 @@ impl Connection {
         let count = usize::try_from(end.saturating_sub(start)).unwrap_or(0);
         let known = count < payload.len();
         if count > 0 {
-            self.receive.assembler.insert(&mut self.receive.next, start, payload.into_first(count));
+            self.receive.assembler.insert(&mut self.receive.next, start, payload.take_first(count));
             self.learn_rhythm(now, count);
         }
         // If data was cut off, is out of order or fills a gap, the acknowledgement leaves at once (RFC 5681, section 4.2).
@@ -73,7 +73,7 @@ impl Connection {
     }
 
     /// Learns the peer's segment size from `count` octets of data, and whether the peer sends after a pause.
-    fn learn_rhythm(&mut self, now: Instant, count: usize) {
+    pub(super) fn learn_rhythm(&mut self, now: Instant, count: usize) {
         let mss = self.advertised_mss();
         if count >= self.receive.segment {
             let (offered, is_new) = (self.receive.offered(), count != self.receive.segment);
@@ -102,7 +102,7 @@ impl Connection {
     }
 
     /// Takes the round trip that the timestamps of arriving data tell, for the receive buffer.
-    fn hear_echo(&mut self, now: Instant, segment: &Segment<'_>) {
+    pub(super) fn hear_echo(&mut self, now: Instant, segment: &Segment<'_>) {
         if let (Some((_, echo)), Some(tuning)) = (segment.options.timestamps, &mut self.receive.tuning)
             && self.receive.has_timestamps
         {
@@ -177,7 +177,7 @@ impl Connection {
 
     /// Decides when arrived data is acknowledged: at once if more than a full segment is unacknowledged or if quick acknowledgements are left, otherwise after
     /// a delay (RFC 9293, section 3.8.6.3).
-    fn decide_acknowledgement(&mut self, now: Instant) {
+    pub(super) fn decide_acknowledgement(&mut self, now: Instant) {
         let unacked = usize::try_from(self.receive.next - self.receive.acked).unwrap_or(usize::MAX);
         // As in Linux, an acknowledgement that would offer less than before waits for the program to read.
         let keeps_window = || self.receive.tuning.is_none() || self.receive.assembler.unread() == 0 || self.free_window().0 >= self.receive.offered();

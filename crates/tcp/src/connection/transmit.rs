@@ -4,6 +4,7 @@ use cohaptic_units::Instant;
 
 use super::build::Content;
 use super::{Connection, Probe, Timer};
+use crate::flight::Flight;
 use crate::info::CaState;
 use crate::scoreboard::Ending;
 use crate::segment::{Ecn, Flags, Segment};
@@ -16,6 +17,8 @@ enum Choice {
     Reply,
     /// A reset, which tells that this end has given the connection up.
     Reset,
+    /// New data up to this position. Nothing is noted as sent.
+    New(Position),
     Segment(Content),
 }
 
@@ -26,24 +29,43 @@ impl Connection {
         match self.choose(now)? {
             Choice::Reply => self.replies.pop_front(),
             Choice::Reset => Some(self.build_reset(now)),
+            Choice::New(end) => {
+                let content = self.send_one(now, end);
+                Some(self.build(now, content))
+            }
             Choice::Segment(content) => Some(self.build(now, content)),
         }
     }
 
-    /// Writes the next segment to send at `now` over the content of `segment`. Returns `false` and writes nothing if no segment may leave at
-    /// present. Saves the move of a returned segment, which is large.
-    #[must_use]
-    pub fn poll_transmit_into(&mut self, now: Instant, segment: &mut Segment<'static>) -> bool {
-        match self.choose(now) {
-            None => return false,
-            Some(Choice::Reply) => self.replies.pop_front().into_iter().for_each(|reply| *segment = reply),
-            Some(Choice::Reset) => *segment = self.build_reset(now),
-            Some(Choice::Segment(content)) => self.write_segment(now, content, segment),
+    /// Appends all segments that may leave at `now` to `flight`: the segments that [`poll_transmit`](Self::poll_transmit) would return one by one, in less
+    /// time.
+    pub fn transmit(&mut self, now: Instant, flight: &mut Flight) {
+        while let Some(choice) = self.choose(now) {
+            match choice {
+                Choice::Reply => self.replies.pop_front().into_iter().for_each(|reply| flight.push(reply)),
+                Choice::Reset => flight.push(self.build_reset(now)),
+                Choice::New(end) => return self.transmit_new(now, end, flight),
+                Choice::Segment(content) => self.append(now, content, flight),
+            }
         }
-        true
     }
 
-    /// Chooses the next segment to send, and notes that the segment leaves.
+    /// Appends all segments of new data to `flight`. The first one ends at `end`.
+    fn transmit_new(&mut self, now: Instant, end: Position, flight: &mut Flight) {
+        let was_empty = self.send.board.is_empty();
+        let mut next = Some(end);
+        // New data makes no reply, no probe and no repetition due, so that only new data is looked for.
+        while let Some(end) = next {
+            let content = self.send_new(now, end);
+            self.append(now, content, flight);
+            next = self.next_new(now, false);
+        }
+        // The last segment decides about the timer, and data is an acknowledgement as well.
+        self.set_flight_timer(now, was_empty);
+        self.send.pushes.is_writing = false;
+    }
+
+    /// Chooses the next segment to send, and notes that the segment leaves, unless the segment has new data.
     fn choose(&mut self, now: Instant) -> Option<Choice> {
         self.follow_up_calls(now);
         // The order of the choices matters. Every segment after the replies acknowledges all data in order, so that a pure acknowledgement comes last. Lost
@@ -64,8 +86,8 @@ impl Connection {
                 if let Some(content) = self.lost_again(now) {
                     return Some(Choice::Segment(content));
                 }
-                if let Some(content) = self.new_data(now, false) {
-                    return Some(Choice::Segment(content));
+                if let Some(end) = self.next_new(now, false) {
+                    return Some(Choice::New(end));
                 }
             }
             if self.receive.ack_now {
@@ -127,9 +149,9 @@ impl Connection {
         self.next_end().is_some()
     }
 
-    /// Sends the next segment of new data, if the windows have room. With `is_probe`, the congestion window and Nagle's algorithm do not count.
+    /// Returns the end of the next segment of new data, if the windows have room. With `is_probe`, the congestion window and Nagle's algorithm do not count.
     #[inline]
-    fn new_data(&mut self, now: Instant, is_probe: bool) -> Option<Content> {
+    fn next_new(&mut self, now: Instant, is_probe: bool) -> Option<Position> {
         if !self.send.has_new() {
             return None;
         }
@@ -153,14 +175,29 @@ impl Connection {
         if is_small && !has_fin {
             self.send.small_end = end;
         }
-        Some(self.send_new(now, end))
+        Some(end)
     }
 
-    /// Sends the new segment that ends at `end`, notes it in the scoreboard, and sets the timers.
+    /// Sends the new segment that ends at `end`, and sets the timer.
+    fn send_one(&mut self, now: Instant, end: Position) -> Content {
+        let was_empty = self.send.board.is_empty();
+        let content = self.send_new(now, end);
+        self.set_flight_timer(now, was_empty);
+        content
+    }
+
+    /// Sets the timer after new data has left. `was_empty` says that nothing was on the way before.
+    fn set_flight_timer(&mut self, now: Instant, was_empty: bool) {
+        // The sending half has one timer, and the timer of a tail probe has priority.
+        if !self.set_tail_timer(now, false) && (was_empty || matches!(self.timer, None | Some((_, Timer::TailProbe | Timer::WindowProbe)))) {
+            self.set_retransmission_timer(now, was_empty);
+        }
+    }
+
+    /// Sends the new segment that ends at `end`, and notes it in the scoreboard. The caller sets the timer.
     #[inline]
     fn send_new(&mut self, now: Instant, end: Position) -> Content {
         let start = self.send.next;
-        let was_empty = self.send.board.is_empty();
         // New data soon after the arrival of data is an answer.
         let has_answered = self.receive.last_data_at.is_some_and(|at| now.saturating_duration_since(at) < self.config.delayed_ack);
         // The FIN has the position after the last octet.
@@ -182,10 +219,6 @@ impl Connection {
         }
         let is_limiting = self.send.board.in_flight() >= self.congestion.window;
         self.congestion.used(self.send.una, end, self.send.board.packets_out(), is_limiting);
-        // The sending half has one timer, and the timer of a tail probe has priority.
-        if !self.set_tail_timer(now, false) && (was_empty || matches!(self.timer, None | Some((_, Timer::TailProbe | Timer::WindowProbe)))) {
-            self.set_retransmission_timer(now, was_empty);
-        }
         let flags = Flags::NONE.with_if(Flags::PSH, pushes || (has_data && is_last && has_several));
         // With a scalable congestion control, every segment has a codepoint already.
         let codepoint = self.codepoint();
@@ -205,7 +238,7 @@ impl Connection {
         match probe {
             // New data is the better probe, because new data must be sent anyway. Without new data, the last segment is repeated.
             Probe::Tail => {
-                let content = self.new_data(now, true);
+                let content = self.next_new(now, true).map(|end| self.send_one(now, end));
                 self.tail.is_again = content.is_none();
                 let content = content.or_else(|| self.last_again(now));
                 self.tail.end = content.is_some().then_some(self.send.next);
@@ -216,7 +249,7 @@ impl Connection {
                 let end = self.send.window_end().min(self.send.end()).min(self.send.next + self.segment_size() as u64);
                 if self.send.has_new() && self.send.next < end && self.state.may_send() {
                     (self.counters.probes, self.counters.probe_backoff) = (0, 0);
-                    let content = self.send_new(now, end);
+                    let content = self.send_one(now, end);
                     return Some(Content { flags: content.flags | Flags::PSH, ..content });
                 }
                 // A segment without data from below the peer's window carries nothing, but forces an answer.

@@ -45,6 +45,12 @@ impl Flags {
         self.0 & other.0 == other.0
     }
 
+    /// Returns these flags but those of `other`.
+    #[must_use]
+    pub(crate) const fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
     /// Returns the union with `other` if `condition` holds, and these flags alone otherwise.
     #[must_use]
     pub(crate) const fn with_if(self, other: Self, condition: bool) -> Self {

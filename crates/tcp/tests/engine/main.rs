@@ -11,6 +11,7 @@ mod buffers;
 mod dctcp;
 mod dualpi2;
 mod flags;
+mod flight;
 mod fuzz;
 mod recovery;
 mod rows;

@@ -29,6 +29,12 @@ impl Held {
         len as u64 + PACKET_COST
     }
 
+    /// Returns the bytes counted for `packets` packets with a content of `len` bytes together.
+    #[cfg(feature = "tcp")]
+    pub(crate) const fn cost_of(packets: usize, len: usize) -> u64 {
+        len as u64 + packets as u64 * PACKET_COST
+    }
+
     #[inline(always)]
     pub(crate) const fn add(&mut self, bytes: u64) {
         self.total += bytes;

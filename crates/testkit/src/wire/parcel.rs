@@ -291,7 +291,7 @@ impl<A: Default> Spare<A> {
     #[cfg(feature = "tcp")]
     pub(crate) fn append(&mut self, parcel: &mut Parcel<A>, segment: Segment<'static>) {
         let spare = &mut self.followers;
-        parcel.followers.get_or_insert_with(|| spare.pop().unwrap_or_default()).push(segment);
+        parcel.followers.get_or_insert_with(|| spare.pop().unwrap_or_default()).flight.push(segment);
     }
 
     /// Takes back a list whose segments were handled or taken out. Drops the list if enough are kept, or if the list is long.

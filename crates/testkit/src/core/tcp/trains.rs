@@ -34,7 +34,7 @@ impl Core {
         loop {
             let machine = &mut self.tcp.end_mut(id).machine;
             if let Some(followers) = leaving.0.as_mut().and_then(|(_, first)| first.followers.as_mut()) {
-                return followers.extend(now, machine);
+                return machine.transmit(now, &mut followers.flight);
             }
             let Some(segment) = machine.poll_transmit(now) else { return };
             match &mut leaving.0 {
@@ -70,7 +70,7 @@ impl Core {
         let followers = first.followers.take();
         take(self, first);
         let Some(mut followers) = followers else { return };
-        for segment in followers.drain() {
+        while let Some(segment) = followers.flight.pop_front() {
             let mut parcel = self.spare.wrapped(addresses, segment);
             arrival.packet.sequence += 1;
             parcel.arrival = arrival;
@@ -87,9 +87,22 @@ impl Core {
         if self.is_up(host)
             && let Some(segment) = first.bytes.segment_mut()
         {
-            let (mut connection, mut leaving) = (self.under_way(host, segment), Leaving::default());
-            for segment in std::iter::once(segment).chain(followers.iter_mut()) {
-                self.arrive_in_train(host, segment, &mut connection, &mut leaving);
+            let (now, mut leaving) = (self.now(), Leaving::default());
+            let mut connection = self.under_way(host, segment);
+            if let Some(id) = connection {
+                self.tcp.end_mut(id).machine.take_segment(now, segment);
+                connection = self.go_on(id, &mut leaving);
+            } else {
+                let _ = self.arrive_whole(host, segment, false);
+            }
+            let flight = &mut followers.flight;
+            while !flight.is_empty() {
+                if let Some(id) = connection {
+                    self.tcp.end_mut(id).machine.handle_next(now, flight);
+                    connection = self.go_on(id, &mut leaving);
+                } else if let Some(mut segment) = flight.pop_front() {
+                    let _ = self.arrive_whole(host, &mut segment, false);
+                }
             }
             if let Some(id) = connection {
                 self.depart(id, leaving);
@@ -108,23 +121,17 @@ impl Core {
         self.tcp.end(id).is_under_way().then_some(id)
     }
 
-    /// Handles a segment of a train. `connection` is the connection of the train as long as the connection is under way. Answers of the connection go to
-    /// `leaving`.
-    fn arrive_in_train(&mut self, host: NodeId, segment: &mut Segment<'_>, connection: &mut Option<ConnId>, leaving: &mut Leaving) {
-        let Some(id) = *connection else {
-            let _ = self.arrive_whole(host, segment, false);
-            return;
-        };
-        let now = self.now();
-        self.tcp.end_mut(id).machine.take_segment(now, segment);
+    /// Goes on after a connection has handled a segment of a train: answers go to `leaving`. Returns the connection if it is still under way.
+    fn go_on(&mut self, id: ConnId, leaving: &mut Leaving) -> Option<ConnId> {
         self.transmit(id, leaving);
         // Called after each segment, so that tasks are woken in the order of the segments.
         self.wake_ends(id);
-        if !self.tcp.end(id).is_under_way() {
-            // `follow_up` may remove the connection, so that the next segments of the train are routed singly.
-            self.depart(id, std::mem::take(leaving));
-            self.follow_up(id);
-            *connection = None;
+        if self.tcp.end(id).is_under_way() {
+            return Some(id);
         }
+        // `follow_up` may remove the connection, so that the next segments of the train are routed singly.
+        self.depart(id, std::mem::take(leaving));
+        self.follow_up(id);
+        None
     }
 }
