@@ -25,8 +25,6 @@ pub(super) struct Kind {
     pub(super) line: Line,
     /// Computation for eight links at once; `None` without correlated delays, with a rate, or where [`Chains::new`] returns `None`.
     pub(super) chains: Option<Chains>,
-    /// `true` if delays are best drawn for several links at once.
-    pub(super) draws_jointly: bool,
     /// `true` if links of this kind have state.
     pub(super) remembers: bool,
 }
@@ -88,12 +86,7 @@ impl Kind {
         let remembers = matches!(line, Line::Queued(_))
             || matches!(loss, Losses::GilbertElliott(_) | Losses::InTime(_))
             || matches!(delay, Delays::Correlated(_));
-        let draws_jointly = match &delay {
-            Delays::Independent(delay) => delay.is_from_normal() && !remembers,
-            // The delays begin together only where no packet waits.
-            Delays::Correlated(delays) => delays.is_from_normal() && matches!(line, Line::Free(_)),
-        };
-        Some(Self { is_random: config.is_random(), keeps_order, loss, delay, line, chains, draws_jointly, remembers })
+        Some(Self { is_random: config.is_random(), keeps_order, loss, delay, line, chains, remembers })
     }
 
     /// Returns whether links that take turns between this kind and others need no more state than [`Remembered`]: a chain of delays, or a chain of losses
@@ -124,23 +117,24 @@ impl Kind {
         }
     }
 
-    /// Computes the fate of a packet of a link without state.
+    /// Computes the fate of a packet of a link without state. `delay` is the packet's delay \[ns\], or [`Law::UNKNOWN`] to draw the delay.
     #[inline(always)]
-    pub(super) fn fate(&mut self, now: Instant, [loss_word, jitter_word]: Words, packet: PacketDraws) -> Verdict {
+    pub(super) fn fate(&mut self, now: Instant, [loss_word, jitter_word]: Words, packet: PacketDraws, delay: u64) -> Verdict {
         match (&self.loss, &mut self.delay) {
             (Losses::Independent(probability), _) if probability.happens(loss_word) => Verdict::Lost,
-            (_, Delays::Independent(delay)) => {
+            (_, Delays::Independent(stage)) => {
                 let leaves = match self.line {
                     Line::Free(nanos) => now.saturating_add_nanos(nanos),
                     Line::Queued(_) => unreachable!("it remembers when the packet before left"),
                 };
-                Verdict::Arrives(leaves.saturating_add_nanos(delay.draw_nanos(leaves, jitter_word, packet)))
+                let delay = if delay == Law::UNKNOWN { stage.draw_nanos(leaves, jitter_word, packet) } else { delay };
+                Verdict::Arrives(leaves.saturating_add_nanos(delay))
             }
             (_, Delays::Correlated(_)) => unreachable!("it remembers the delay before"),
         }
     }
 
-    /// Returns the delays of a packet of each of several links without state \[ns\], or [`Law::UNKNOWN`] where [`Kind::fate`] must draw the delay.
+    /// Returns the delays of a packet of each of several links \[ns\], or [`Law::UNKNOWN`] where [`Kind::fate`] or [`Kind::verdict`] must draw the delay.
     #[inline(always)]
     pub(super) fn delays<const N: usize>(&self, words: &[Words; N]) -> [u64; N] {
         let Delays::Independent(delay) = &self.delay else { return [Law::UNKNOWN; N] };
@@ -151,19 +145,10 @@ impl Kind {
         delay.nanos_at_once(&of_jitter)
     }
 
-    /// Computes the fate of a packet of a link without state like [`Kind::fate`], with a delay \[ns\] that is known.
+    /// Computes the fate of a packet of a link with the state `link`, and changes the state. `delay` is the packet's delay \[ns\] with the value of the chain
+    /// of delays, or [`Law::UNKNOWN`] to draw both.
     #[inline(always)]
-    pub(super) fn fate_of_known(&self, now: Instant, loss_word: u64, nanos: u64) -> Verdict {
-        match (&self.loss, self.line) {
-            (Losses::Independent(probability), _) if probability.happens(loss_word) => Verdict::Lost,
-            (_, Line::Free(time)) => Verdict::Arrives(now.saturating_add_nanos(time).saturating_add_nanos(nanos)),
-            (_, Line::Queued(_)) => unreachable!("it remembers when the packet before left"),
-        }
-    }
-
-    /// Computes the fate of a packet of a link with the state `link`, and changes the state.
-    #[inline(always)]
-    pub(super) fn verdict(&mut self, now: Instant, link: &mut Remembered, words: Words, packet: PacketDraws) -> Verdict {
+    pub(super) fn verdict(&mut self, now: Instant, link: &mut Remembered, words: Words, packet: PacketDraws, (value, delay): (f64, u64)) -> Verdict {
         if self.loses(now, link, words, packet) {
             return Verdict::Lost;
         }
@@ -178,7 +163,14 @@ impl Kind {
                 }
             },
         };
-        Verdict::Arrives(self.arrival(leaves, link, words, packet))
+        if delay == Law::UNKNOWN {
+            return Verdict::Arrives(self.arrival(leaves, link, words, packet));
+        }
+        // A link without a chain of delays may have its instant for a chain of losses.
+        if let Delays::Correlated(_) = self.delay {
+            (link.normal, link.at) = (value, leaves);
+        }
+        Verdict::Arrives(leaves.saturating_add_nanos(delay))
     }
 
     /// Returns whether a packet of a link with the state `link` is lost, and changes the state.
@@ -192,38 +184,16 @@ impl Kind {
         }
     }
 
-    /// Returns the next values of the chains of delays of several links with these states, for packets that are offered `now`, and the delays \[ns\], or
-    /// [`Law::UNKNOWN`] where [`Kind::verdict`] must draw the delay.
+    /// Returns the delays of [`Kind::delays`] for links with these states, whose packets are offered `now`, and the next values of the chains of delays.
     #[inline(always)]
     pub(super) fn delays_of_chains<const N: usize>(&self, now: Instant, links: &[Remembered], words: &[Words; N]) -> ([f64; N], [u64; N]) {
-        let (Delays::Correlated(delays), Line::Free(time)) = (&self.delay, self.line) else { return ([0.0; N], [Law::UNKNOWN; N]) };
+        // The delays of chains begin together only where no packet waits.
+        let (Delays::Correlated(delays), Line::Free(time)) = (&self.delay, self.line) else { return ([0.0; N], self.delays(words)) };
         let (mut of_jitter, mut chains) = ([0; N], [(f64::NAN, Instant::MAX); N]);
         for ((of_jitter, chain), ([_, word], link)) in of_jitter.iter_mut().zip(&mut chains).zip(words.iter().zip(links)) {
             (*of_jitter, *chain) = (*word, (link.normal, link.at));
         }
         delays.nanos_at_once(now.saturating_add_nanos(time), &chains, &of_jitter)
-    }
-
-    /// Computes the fate of a packet like [`Kind::verdict`], with a value of the chain of delays and a delay \[ns\] that are known.
-    #[inline(always)]
-    pub(super) fn verdict_of_known(
-        &mut self,
-        now: Instant,
-        link: &mut Remembered,
-        words: Words,
-        packet: PacketDraws,
-        (value, nanos): (f64, u64),
-    ) -> Verdict {
-        if self.loses(now, link, words, packet) {
-            return Verdict::Lost;
-        }
-        let Line::Free(time) = self.line else { unreachable!("delays after a queue are drawn singly") };
-        let leaves = now.saturating_add_nanos(time);
-        if nanos == Law::UNKNOWN {
-            return Verdict::Arrives(self.arrival(leaves, link, words, packet));
-        }
-        (link.normal, link.at) = (value, leaves);
-        Verdict::Arrives(leaves.saturating_add_nanos(nanos))
     }
 
     /// Returns the arrival of a packet that leaves the transmitter at `leaves`, without the order of packets.

@@ -11,6 +11,7 @@ use cohaptic_units::Instant;
 use super::kind::{Kind, Line, Remembered};
 use super::losses::Verdict;
 use super::switching::States;
+use crate::laws::delay::Law;
 use crate::line::direct::Words;
 use crate::line::model::LinkModel;
 use crate::random::PacketDraws;
@@ -34,6 +35,9 @@ pub(super) struct Kinds {
     pub(super) are_random: bool,
     /// `true` if links of any of the kinds have state.
     pub(super) remember: bool,
+    /// Latest instant of a packet of any of the links.
+    #[cfg(debug_assertions)]
+    latest: Instant,
 }
 
 impl Kinds {
@@ -53,7 +57,18 @@ impl Kinds {
         };
         let (next, present) = states.as_ref().map_or((Instant::MAX, 0), |states| (states.next_change(), states.present()));
         let (are_random, remember) = (all.iter().any(|kind| kind.is_random), all.iter().any(|kind| kind.remembers));
-        Some(Self { model: model.clone(), seed, next, present, all, states, are_random, remember })
+        Some(Self {
+            model: model.clone(),
+            seed,
+            next,
+            present,
+            all,
+            states,
+            are_random,
+            remember,
+            #[cfg(debug_assertions)]
+            latest: Instant::ZERO,
+        })
     }
 
     /// Returns whether the links of a model, whose modulator has this seed, are of these kinds.
@@ -72,9 +87,14 @@ impl Kinds {
     }
 
     /// Returns the kind of the links for a packet that is offered `now`. Returns `None` if the modulator changes while the packet is in transmission.
-    /// Instants must not go back, over all links together.
+    /// Instants must not go back, over all links together: the modulator does not return to a state before.
     #[inline(always)]
     pub(super) fn at(&mut self, now: Instant) -> Option<&mut Kind> {
+        #[cfg(debug_assertions)]
+        if self.states.is_some() {
+            let latest = core::mem::replace(&mut self.latest, now);
+            assert!(latest <= now, "a packet at {now:?} came after a packet at {latest:?}, over links of one modulator");
+        }
         if self.next <= now {
             self.pass(now);
         }
@@ -106,7 +126,7 @@ impl Kinds {
     #[inline]
     pub(super) fn verdict(&mut self, now: Instant, link: &mut Remembered, words: Words, packet: PacketDraws) -> (Verdict, bool) {
         match self.at(now) {
-            Some(kind) => (kind.verdict(now, link, words, packet), kind.keeps_order),
+            Some(kind) => (kind.verdict(now, link, words, packet, (f64::NAN, Law::UNKNOWN)), kind.keeps_order),
             None => self.verdict_over_changes(now, link, words, packet),
         }
     }

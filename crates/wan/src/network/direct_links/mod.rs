@@ -19,7 +19,6 @@ use switching::Switching;
 use super::id::LinkId;
 use crate::fates::fate::DropCause;
 use crate::fates::stats::LinkStats;
-use crate::laws::delay::Law;
 use crate::line::direct::{Direct, Words};
 use crate::line::model::LinkModel;
 use crate::line::name::LinkName;
@@ -216,11 +215,11 @@ impl DirectLinks {
     }
 
     /// Offers a packet to each of `count` links from `first` on, at most [`DirectLinks::AT_ONCE`] links, and writes the fates of the packets into `arrivals`.
-    /// Links with their bit set in `excluded` are left out. Instants must not go back.
+    /// Links with their bit set in `excluded` are left out. Instants must not go back, of a link and of all links with one modulator.
     ///
     /// # Panics
     ///
-    /// If a link is missing. With debug assertions, also if a packet comes earlier than the [`Load`] allows.
+    /// If a link is missing. With debug assertions, also if a packet comes earlier than the [`Load`] allows, or than another packet of its modulator.
     #[inline(always)]
     pub fn offer(&mut self, now: Instant, first: LinkId, count: usize, excluded: u8, arrivals: &mut Arrivals) {
         // The type parameter keeps the rarer code out of the loop: see `offer_as`.
@@ -269,11 +268,9 @@ impl DirectLinks {
             // A wrong value of `CHAINS` is slow, but gives the same answers.
             Some(_) => self.offer_one_by_one(now, first, count, excluded, arrivals),
             None if CHAINS => self.offer_one_by_one(now, first, count, excluded, arrivals),
-            None if !kind.remembers && kind.draws_jointly => alike::<false, true>(kind, (links, &mut []), span, excluded, arrivals),
-            None if !kind.remembers => alike::<false, false>(kind, (links, &mut []), span, excluded, arrivals),
+            None if !kind.remembers => alike::<false>(kind, (links, &mut []), span, excluded, arrivals),
             // Every link of the kind has an entry in `remembered`.
-            None if kind.draws_jointly => alike::<true, true>(kind, (links, &mut self.remembered[first..first + count]), span, excluded, arrivals),
-            None => alike::<true, false>(kind, (links, &mut self.remembered[first..first + count]), span, excluded, arrivals),
+            None => alike::<true>(kind, (links, &mut self.remembered[first..first + count]), span, excluded, arrivals),
         }
     }
 
@@ -438,35 +435,27 @@ impl Other {
     }
 }
 
-/// Draws the first random words of the next packet of each of these links, and writes the packet's number into `sequences`. The words are zero if the kind is
-/// not random.
+/// Offers a packet to each of these links of one kind, with state if `REMEMBER` is set. All draws come before all verdicts. The verdict is chosen by a constant
+/// rather than given as a closure, so the verdict is inlined into the loop.
 #[inline(always)]
-fn draw(is_random: bool, links: &[LinkState], sequences: &mut [u64; DirectLinks::AT_ONCE]) -> [Words; DirectLinks::AT_ONCE] {
-    let mut words = [[0; 2]; DirectLinks::AT_ONCE];
-    for (link, (words, sequence)) in links.iter().zip(words.iter_mut().zip(sequences)) {
-        *sequence = link.offered;
-        if is_random {
-            *words = link.draws.packet(link.offered).loss_and_jitter();
-        }
-    }
-    words
-}
-
-/// Offers a packet to each of these links of one kind, with state if `REMEMBER` is set, and with delays drawn for all of them together if `JOINTLY` is set. All
-/// draws come before all verdicts. The verdict is chosen by constants rather than given as a closure, so the verdict is inlined into the loop.
-#[inline(always)]
-fn alike<const REMEMBER: bool, const JOINTLY: bool>(
+fn alike<const REMEMBER: bool>(
     kind: &mut Kind,
     (links, remembered): (&mut [LinkState], &mut [Remembered]),
     (now, until): (Instant, Instant),
     excluded: u8,
     arrivals: &mut Arrivals,
 ) {
-    let words = draw(kind.is_random, links, &mut arrivals.sequences);
-    let (values, delays) = match JOINTLY {
-        true if REMEMBER => kind.delays_of_chains(now, remembered, &words),
-        true => ([0.0; DirectLinks::AT_ONCE], kind.delays(&words)),
-        false => ([0.0; DirectLinks::AT_ONCE], [Law::UNKNOWN; DirectLinks::AT_ONCE]),
+    // The first random words of the next packet of each link, or zeros if the kind is not random.
+    let mut words = [[0; 2]; DirectLinks::AT_ONCE];
+    for (link, (words, sequence)) in links.iter().zip(words.iter_mut().zip(&mut arrivals.sequences)) {
+        *sequence = link.offered;
+        if kind.is_random {
+            *words = link.draws.packet(link.offered).loss_and_jitter();
+        }
+    }
+    let (values, delays) = match REMEMBER {
+        true => kind.delays_of_chains(now, remembered, &words),
+        false => ([f64::NAN; DirectLinks::AT_ONCE], kind.delays(&words)),
     };
     let (mut bit, mut arrive, mut overtake, mut wait) = (1, 0, 0, 0);
     for place in 0..links.len().min(DirectLinks::AT_ONCE) {
@@ -474,11 +463,9 @@ fn alike<const REMEMBER: bool, const JOINTLY: bool>(
         // An excluded link counts no packet, so its next packet has the same number and random words.
         if excluded & bit == 0 {
             let draws = link.draws.packet(link.offered);
-            let verdict = match delays[place] {
-                nanos if REMEMBER && JOINTLY => kind.verdict_of_known(now, &mut remembered[place], words, draws, (values[place], nanos)),
-                _ if REMEMBER => kind.verdict(now, &mut remembered[place], words, draws),
-                nanos if JOINTLY && nanos != Law::UNKNOWN => kind.fate_of_known(now, words[0], nanos),
-                _ => kind.fate(now, words, draws),
+            let verdict = match REMEMBER {
+                true => kind.verdict(now, &mut remembered[place], words, draws, (values[place], delays[place])),
+                false => kind.fate(now, words, draws, delays[place]),
             };
             link.offered += 1;
             match verdict {
@@ -550,7 +537,8 @@ impl LinkState {
     /// Returns the arrival of a packet, not before an earlier packet if `keeps_order` is set.
     #[inline(always)]
     fn in_order(&self, keeps_order: bool, at: Instant) -> Instant {
-        if keeps_order { at.max(self.latest) } else { at }
+        // Nobody can predict which packets wait, so the choice must not be a branch.
+        core::hint::select_unpredictable(keeps_order & (self.latest > at), self.latest, at)
     }
 
     /// Counts the arrival of a packet, and returns whether the packet overtakes an earlier packet.

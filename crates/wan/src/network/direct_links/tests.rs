@@ -131,22 +131,29 @@ fn lines_without_wait_decide_what_whole_links_decide() {
     }
 }
 
-/// Delays of lognormal and gamma laws without correlation are drawn for several links together: with loss and without, in order, and behind a line on which
-/// no packet waits. The last law is nearly always at its floor, and has series of logarithms.
+/// Delays of normal, lognormal and gamma laws without correlation are drawn for several links together: with loss and without, in order, and behind a line on
+/// which no packet waits, or packets do. The first law is cut at zero; the last law is nearly always at its floor, and has series of logarithms.
 #[test]
 fn delays_that_are_drawn_together_are_those_of_whole_links() {
     let us = Duration::from_micros;
     for (law, mean, sd, floor) in [
+        (Distribution::Normal, us(3_000), us(2_000), us(0)),
+        (Distribution::Normal, us(24_000), us(9_000), us(0)),
         (Distribution::LogNormal, us(44_300), us(98_890), us(1_500)),
         (Distribution::Gamma, us(24_000), us(6_000), us(0)),
         (Distribution::Gamma, us(11_350), us(6_300), us(9_950)),
     ] {
         let delay = Delay::with_jitter(mean, Jitter { floor, ..Jitter::new(sd, law) }).unwrap();
-        for (loss, order, rate) in
-            [("", Order::AllowReordering, false), ("loss 20%", Order::InOrder, false), ("loss 20%", Order::AllowReordering, true)]
-        {
+        for (loss, order, rate) in [
+            ("", Order::AllowReordering, None),
+            ("loss 20%", Order::InOrder, None),
+            ("loss gemodel 5% 20%", Order::InOrder, None),
+            ("loss 20%", Order::AllowReordering, Some(5_000_000)),
+            ("loss 20%", Order::AllowReordering, Some(100_000)),
+        ] {
             let config = LinkConfig { delay: delay.clone(), order, layout: Layout::Physical, ..model(loss).as_fixed().unwrap().clone() };
-            let bottleneck = rate.then(|| Bottleneck::at_rate(Rate::bits_per_sec(5_000_000).unwrap()));
+            let limit = Some(QueueLimit::Packets(3));
+            let bottleneck = rate.map(|rate| Bottleneck { limit, ..Bottleneck::at_rate(Rate::bits_per_sec(rate).unwrap()) });
             let load = Load { gap: Duration::from_millis(4), ..OF_TESTS };
             let link = LinkModel::from(LinkConfig { bottleneck, ..config });
             compare_under(load, &[const { None }; 8].map(|_: Option<()>| link.clone()));
@@ -256,6 +263,30 @@ fn links_with_a_modulator_decide_what_whole_links_decide() {
     for refused in [stops, slow, flaps] {
         assert!(!DirectLinks::takes(&refused, load), "{}", refused.words());
     }
+}
+
+/// Two links that change together, of which the second is offered a packet before the latest packet of the first.
+#[test]
+#[cfg(debug_assertions)]
+fn instants_that_go_back_over_links_of_one_modulator_are_an_error_of_the_program() {
+    let state = |next| ModulatorState { sojourn: Some(Sojourn::Fixed(Duration::from_millis(17))), next };
+    let modulator = Modulator::new("two", vec![state(vec![0.0, 1.0]), state(vec![1.0, 0.0])]).unwrap();
+    let config = |words: &str| LinkConfig { layout: Layout::Physical, ..model(words).as_fixed().unwrap().clone() };
+    let configs = ["delay 5ms", "delay 9ms"].map(config).to_vec();
+    let modulated = LinkModel::from(Modulated::new(modulator, configs).unwrap());
+    let offered = |model: LinkModel, second: u64| {
+        std::panic::catch_unwind(move || {
+            let mut links = DirectLinks::new(Instant::MAX, OF_TESTS);
+            (0..2).for_each(|to| assert!(links.add(1, &LinkName::between("a", &to.to_string()), &model)));
+            links.offer_one(Instant::from_nanos(20_000_000), LinkId::new(0));
+            links.offer(Instant::from_nanos(second), LinkId::new(1), 1, 0, &mut Arrivals::NONE.clone());
+        })
+        .is_ok()
+    };
+    assert!(offered(modulated.clone(), 20_000_000));
+    assert!(!offered(modulated, 19_999_999));
+    // Links without a modulator have their own time.
+    assert!(offered(model("delay 5ms"), 0));
 }
 
 /// Compares links that are offered packets in groups of eight, then of five, with one [`Link`] for each model: the same packets at the same instants, and the

@@ -120,21 +120,33 @@ impl DelayStage {
         }
     }
 
-    /// Returns whether delays are drawn from a normal number alone, so that [`nanos_at_once`](Self::nanos_at_once) knows most of them.
-    pub(crate) const fn is_from_normal(&self) -> bool {
-        matches!(self.law, StageLaw::FromNormal(_))
-    }
-
     /// Returns the delays \[ns\] of several packets with these first random words for jitter, or [`Law::UNKNOWN`] for the few delays that need further words or
     /// more digits, and for all delays of a law that is not drawn from a normal number.
     #[inline(always)]
     pub(crate) fn nanos_at_once<const N: usize>(&self, words: &[u64; N]) -> [u64; N] {
-        let StageLaw::FromNormal(checked) = &self.law else { return [Law::UNKNOWN; N] };
-        let mut z = [0.0; N];
-        for (z, word) in z.iter_mut().zip(words) {
-            *z = in_the_core_or_nan(*word);
+        let mut nanos = [Law::UNKNOWN; N];
+        match &self.law {
+            StageLaw::Constant => nanos = [self.mean_nanos; N],
+            StageLaw::Normal { sd_nanos } => {
+                // Beyond 2^62 the sum below could overflow.
+                let Some(mean) = i64::try_from(self.mean_nanos).ok().filter(|mean| *mean < 1 << 62) else { return nanos };
+                for (nanos, word) in nanos.iter_mut().zip(words) {
+                    let deviation = sd_nanos * in_the_core_or_nan(*word);
+                    // A NaN fails the comparison. As in `draw_nanos`, a large negative deviation ends at a delay of zero.
+                    let whole = mean.wrapping_add(with_room(deviation)).max(0).cast_unsigned();
+                    *nanos = if deviation.abs() < SMALL { whole } else { Law::UNKNOWN };
+                }
+            }
+            StageLaw::FromNormal(checked) => {
+                let mut z = [0.0; N];
+                for (z, word) in z.iter_mut().zip(words) {
+                    *z = in_the_core_or_nan(*word);
+                }
+                nanos = checked.law.whole_at_normals(&z);
+            }
+            StageLaw::Independent(_) | StageLaw::Correlated(_) => {}
         }
-        checked.law.whole_at_normals(&z)
+        nanos
     }
 
     /// Returns a delay \[ns\] of the laws without inline draw.
@@ -165,7 +177,7 @@ impl DelayStage {
 #[derive(Clone, Debug)]
 pub(crate) struct CorrelatedDelays {
     marginal: Marginal,
-    /// Law of a delay, if delays are computed from a normal number: lognormal and gamma.
+    /// Law of a delay, if a delay is computed from the value of its chain alone: lognormal and gamma, where the whole variance has memory.
     law: Option<Arc<Checked>>,
     memory: Memory,
     /// `true` if only a share of the variance has memory.
@@ -190,16 +202,10 @@ impl CorrelatedDelays {
         }
         // A gamma law gets a separate form, without the choice between laws at each packet.
         let marginal = checked.law.as_gamma().map_or_else(|| Marginal::Other(Arc::clone(checked)), Marginal::Gamma);
-        let is_from_normal = matches!(checked.jitter.distribution, Distribution::LogNormal | Distribution::Gamma);
-        let law = is_from_normal.then(|| Arc::clone(checked));
         let is_of_share = matches!(memory, Memory::InTime { parts: [_, rest], .. } if rest > 0.0);
+        let is_from_normal = matches!(checked.jitter.distribution, Distribution::LogNormal | Distribution::Gamma);
+        let law = (is_from_normal && !is_of_share).then(|| Arc::clone(checked));
         Some(Self { marginal, law, memory, is_of_share, weights: Weights::new(memory, 0) })
-    }
-
-    /// Returns whether a delay is a function of the value of its chain that is computed for several links at once: see
-    /// [`nanos_at_once`](Self::nanos_at_once).
-    pub(crate) fn is_from_normal(&self) -> bool {
-        self.law.is_some() && !self.is_of_share
     }
 
     /// Returns the next values of the chains of several links whose packets begin to propagate `now`, and the delays \[ns\]. `chains` has the latest value
