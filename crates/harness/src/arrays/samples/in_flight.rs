@@ -1,45 +1,31 @@
 //! Samples in flight, in a timing wheel indexed by the tick of the arrival.
 
+mod lists;
+
 use std::collections::BTreeMap;
 
 use cohaptic_units::Instant;
 
-/// Ticks of the wheel, so a second at 1 kHz fits: delays of satellites with queues. Packets with a later arrival are kept in a slower map.
-const HORIZON: u64 = 1024;
-/// Slots of the wheel: two for each tick.
-const SLOTS: usize = 2048;
+use lists::{List, Lists};
 
-/// Returns the first slot of a tick: samples in order. The next slot holds overtaking samples.
-fn slot(tick: u64) -> usize {
-    2 * (tick % HORIZON) as usize
-}
+/// Ticks of the wheel, so a second at 1 kHz fits: delays of satellites with queues. Packets with a later arrival are kept in a slower map.
+const HORIZON: u64 = SPOKES as u64;
+const SPOKES: usize = 1024;
 
 /// Samples in flight, by the tick of their arrival.
 #[derive(Clone, Debug)]
 pub(super) struct InFlight<const A: usize> {
     ticks: Ticks,
-    /// Packets with an arrival within [`HORIZON`] ticks. See [`slot`].
-    wheel: Box<[Vec<Packet<A>>; SLOTS]>,
+    packets: Lists<Packet<A>>,
+    /// Packets with an arrival within [`HORIZON`] ticks, indexed by the tick modulo [`HORIZON`].
+    wheel: Box<[Bucket; SPOKES]>,
     /// Packets with a later arrival, by tick.
-    beyond: BTreeMap<u64, Bucket<A>>,
-    /// Allocations of emptied slots. The latest allocation is used first, because its memory is most likely in the cache.
-    emptied: Vec<Vec<Packet<A>>>,
+    beyond: BTreeMap<u64, Bucket>,
 }
 
-/// Samples with an arrival at the same tick.
-#[derive(Clone, Debug)]
-pub(super) struct Bucket<const A: usize> {
-    /// Samples with arrivals in the order of insertion on each link.
-    pub(super) in_order: Vec<Packet<A>>,
-    /// Samples with a possible arrival before samples of the same link inserted earlier.
-    pub(super) overtaking: Vec<Packet<A>>,
-}
-
-impl<const A: usize> Default for Bucket<A> {
-    fn default() -> Self {
-        Self { in_order: Vec::new(), overtaking: Vec::new() }
-    }
-}
+/// Samples with an arrival at the same tick: first samples with arrivals in the order of insertion on each link, then samples with a possible arrival before
+/// samples of the same link inserted earlier. An array, because its index needs no branch.
+pub(super) type Bucket = [List; 2];
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Packet<const A: usize> {
@@ -53,6 +39,25 @@ pub(super) struct Packet<const A: usize> {
     pub(super) stands_for: u16,
     pub(super) position: [f64; A],
     pub(super) velocity: [f64; A],
+}
+
+/// Latest packet of a link that keeps the order of packets.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Latest {
+    /// Place of the packet in [`InFlight`]. Without meaning after the packet was taken in.
+    place: u32,
+    /// Lower bits of the sequence number of the next packet.
+    next: u32,
+}
+
+impl Latest {
+    /// No packet. The first packet of a link waits for no other, so these numbers have no meaning.
+    pub(super) const NONE: Self = Self { place: 0, next: 0 };
+}
+
+impl<const A: usize> Packet<A> {
+    /// A packet without meaning.
+    const NONE: Self = Self { arrival: Instant::ZERO, sequence: 0, place: 0, receiver: 0, stands_for: 0, position: [0.0; A], velocity: [0.0; A] };
 }
 
 /// Converts spans to ticks, rounded up.
@@ -85,157 +90,163 @@ impl Ticks {
 impl<const A: usize> InFlight<A> {
     /// Returns a wheel without samples. A tick has `tick_nanos` nanoseconds.
     pub(super) fn new(tick_nanos: u64) -> Self {
-        Self { ticks: Ticks::new(tick_nanos), wheel: Box::new(std::array::from_fn(|_| Vec::new())), beyond: BTreeMap::new(), emptied: Vec::new() }
+        let wheel = Box::new([[List::EMPTY; 2]; SPOKES]);
+        Self { ticks: Ticks::new(tick_nanos), packets: Lists::new(Packet::NONE), wheel, beyond: BTreeMap::new() }
     }
 
     /// Stores a packet known from the given tick and instant on. `overtakes`: `true` if the packet may arrive before an earlier packet of its link.
     #[inline(always)]
-    pub(super) fn push(&mut self, (tick, now): (u64, Instant), packet: Packet<A>, overtakes: bool) {
-        // `now` is a multiple of the tick, so this sum is the first tick at or after the arrival.
-        let ticks = self.ticks.count(packet.arrival.as_nanos() - now.as_nanos());
-        let due = tick.saturating_add(ticks);
-        self.packets_at((ticks, due), overtakes).push(packet);
+    pub(super) fn push(&mut self, at: (u64, Instant), packet: Packet<A>, overtakes: bool) {
+        let (ticks, due) = self.due_of(at, packet.arrival);
+        let list = if ticks >= HORIZON { beyond(&mut self.beyond, due, overtakes) } else { &mut self.wheel[spoke(due)][usize::from(overtakes)] };
+        // Written where it stays. A packet as an argument would be assembled on the stack and copied in words wider than its fields. Such a copy stalls the
+        // processor.
+        *self.packets.push(list).1 = packet;
     }
 
-    /// Stores a packet like [`push`](Self::push), of a link that keeps the order of packets. `latest` is the index of the latest packet of the link among
-    /// the packets of its tick, and is replaced. `waits`: `true` if the packet arrives together with that packet.
+    /// Stores a packet like [`push`](Self::push), of a link that keeps the order of packets. `latest` is the latest packet of the link, and is replaced.
+    /// `waits`: `true` if the packet is known to arrive together with an earlier packet.
     ///
     /// Of packets that arrive together a receiver sees the newest only, so the newest takes the place of the packet before. Many packets may wait
     /// for a packet with a long delay, and would take more memory than the caches of the processor.
     #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 packets of a tick fit into memory")]
-    pub(super) fn push_in_order(&mut self, (tick, now): (u64, Instant), packet: Packet<A>, waits: bool, latest: &mut u32) {
-        let ticks = self.ticks.count(packet.arrival.as_nanos() - now.as_nanos());
-        let packets = self.packets_at((ticks, tick.saturating_add(ticks)), false);
-        // Sequence numbers without a gap tell which packets this packet stands for. The latest packet is elsewhere if it was pushed beyond the wheel.
-        if waits
-            && let Some(before) = packets.get_mut(*latest as usize)
-            && (before.place, before.arrival, before.sequence + 1) == (packet.place, packet.arrival, packet.sequence)
-            && before.stands_for < u16::MAX
-        {
-            *before = Packet { stands_for: before.stands_for + 1, ..packet };
-            return;
-        }
-        *latest = packets.len() as u32;
-        packets.push(packet);
+    #[expect(clippy::cast_possible_truncation, reason = "the lower bits tell apart the packets of a link that are in flight")]
+    pub(super) fn push_in_order(&mut self, at: (u64, Instant), packet: Packet<A>, waits: bool, latest: &mut Latest) {
+        // A packet that waits arrives after the present tick, together with the latest packet that arrives, so that packet is still in its place if no packet
+        // between the two was lost. At each multiple of 2^16 a packet begins anew, so that `stands_for` has enough bits.
+        let follows = waits & (latest.next == packet.sequence as u32) & (packet.sequence as u16 != 0);
+        let (ticks, due) = self.due_of(at, packet.arrival);
+        // Nobody can predict which packets follow, so there is no branch for them.
+        let list = if !follows & (ticks >= HORIZON) { beyond(&mut self.beyond, due, false) } else { &mut self.wheel[spoke(due)][0] };
+        let (place, item) = self.packets.push_unless(follows, latest.place, list);
+        let stands_for = std::hint::select_unpredictable(follows, item.stands_for.wrapping_add(1), 0);
+        *item = Packet { stands_for, ..packet };
+        *latest = Latest { place, next: (packet.sequence as u32).wrapping_add(1) };
     }
 
-    /// Returns the packets due at the tick `due`, `ticks` ticks ahead.
-    ///
-    /// The caller pushes the packet itself. A packet as an argument would be assembled on the stack and copied in words wider than its fields. Such a copy
-    /// stalls the processor.
+    /// Returns the tick at which a packet is due with this arrival, and the number of ticks from the present tick to that tick.
     #[inline(always)]
-    fn packets_at(&mut self, (ticks, due): (u64, u64), overtakes: bool) -> &mut Vec<Packet<A>> {
-        if ticks >= HORIZON {
-            return self.packets_beyond(due, overtakes);
-        }
-        // Index by addition, without a branch.
-        let packets = &mut self.wheel[slot(due) + usize::from(overtakes)];
-        // A slot gives its allocation away when its packets are taken in, so a slot in use for the first time or again takes an emptied one.
-        if packets.capacity() == 0 {
-            *packets = self.emptied.pop().unwrap_or_default();
-        }
-        packets
-    }
-
-    #[cold]
-    fn packets_beyond(&mut self, due: u64, overtakes: bool) -> &mut Vec<Packet<A>> {
-        let Bucket { in_order, overtaking } = self.beyond.entry(due).or_default();
-        let packets = if overtakes { overtaking } else { in_order };
-        if packets.capacity() == 0 {
-            *packets = self.emptied.pop().unwrap_or_default();
-        }
-        packets
+    fn due_of(&self, (tick, now): (u64, Instant), arrival: Instant) -> (u64, u64) {
+        // `now` is a multiple of the tick, so this sum is the first tick at or after the arrival.
+        let ticks = self.ticks.count(arrival.as_nanos() - now.as_nanos());
+        (ticks, tick.saturating_add(ticks))
     }
 
     /// Returns all packets in flight, in no particular order.
     pub(super) fn iter(&self) -> impl Iterator<Item = &Packet<A>> {
-        self.wheel.iter().flatten().chain(self.beyond.values().flat_map(|bucket| bucket.in_order.iter().chain(&bucket.overtaking)))
+        self.wheel.iter().chain(self.beyond.values()).flatten().flat_map(move |list| self.packets.slices(*list).flatten())
     }
 
-    /// Keeps the allocations of a bucket after its packets were taken in.
-    pub(super) fn reuse(&mut self, Bucket { in_order, overtaking }: Bucket<A>) {
-        for mut packets in [overtaking, in_order] {
-            if packets.capacity() > 0 {
-                packets.clear();
-                self.emptied.push(packets);
-            }
+    /// Returns the packets of a list of a bucket, in slices.
+    #[inline(always)]
+    pub(super) fn slices(&self, list: List) -> impl Iterator<Item = &[Packet<A>]> {
+        self.packets.slices(list)
+    }
+
+    /// Keeps the memory of a bucket after its packets were taken in.
+    #[inline(always)]
+    pub(super) fn reuse(&mut self, bucket: Bucket) {
+        for list in bucket {
+            self.packets.give_back(list);
+        }
+    }
+
+    /// Removes the packets of a bucket that `keeps` does not accept.
+    pub(super) fn retain(&mut self, bucket: &mut Bucket, keeps: impl Fn(&Packet<A>) -> bool) {
+        for list in bucket {
+            let all = std::mem::replace(list, List::EMPTY);
+            self.packets.append(list, all, &keeps);
         }
     }
 
     /// Removes and returns the samples due at `tick`; `None` without samples.
     #[inline(always)]
-    pub(super) fn due(&mut self, tick: u64) -> Option<Bucket<A>> {
+    pub(super) fn due(&mut self, tick: u64) -> Option<Bucket> {
         // Checked at every tick: a tick of the map enters the wheel only when due.
         if !self.beyond.is_empty() {
             self.come_near(tick);
         }
-        let slot = slot(tick);
-        let (in_order, overtaking) = (std::mem::take(&mut self.wheel[slot]), std::mem::take(&mut self.wheel[slot + 1]));
-        (!in_order.is_empty() || !overtaking.is_empty()).then_some(Bucket { in_order, overtaking })
+        let [in_order, overtaking] = std::mem::replace(&mut self.wheel[spoke(tick)], [List::EMPTY; 2]);
+        (!in_order.is_empty() || !overtaking.is_empty()).then_some([in_order, overtaking])
     }
 
     /// Moves the samples of the map due at `tick` into the wheel, before the samples pushed later.
     #[cold]
     fn come_near(&mut self, tick: u64) {
         if let Some(bucket) = self.beyond.remove(&tick) {
-            for (mut packets, slot) in [bucket.in_order, bucket.overtaking].into_iter().zip(slot(tick)..) {
-                // The order of insertion is kept: samples of the map were pushed at earlier ticks than all samples of the slot.
-                packets.append(&mut self.wheel[slot]);
-                let emptied = std::mem::replace(&mut self.wheel[slot], packets);
-                if emptied.capacity() > 0 {
-                    self.emptied.push(emptied);
-                }
+            for (mut list, near) in bucket.into_iter().zip(&mut self.wheel[spoke(tick)]) {
+                // The order of insertion is kept: samples of the map were pushed at earlier ticks than all samples of the wheel.
+                self.packets.append(&mut list, *near, |_| true);
+                *near = list;
             }
         }
     }
+}
+
+/// Returns a list of packets that are due at a tick beyond the wheel.
+#[cold]
+fn beyond(buckets: &mut BTreeMap<u64, Bucket>, due: u64, overtakes: bool) -> &mut List {
+    &mut buckets.entry(due).or_insert([List::EMPTY; 2])[usize::from(overtakes)]
+}
+
+/// Returns the index of a tick in the wheel.
+#[inline(always)]
+const fn spoke(tick: u64) -> usize {
+    (tick % HORIZON) as usize
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Samples that are on the way for longer than the wheel is wide, and some that are not: memory is used again, and does not grow with time.
-    #[test]
-    fn late_samples_take_the_memory_of_earlier_ones() {
-        let mut in_flight = InFlight::<1>::new(1);
-        let packet = |arrival: u64| Packet {
-            arrival: Instant::from_nanos(arrival),
-            sequence: 0,
-            place: 0,
-            receiver: 0,
-            stands_for: 0,
-            position: [0.0],
-            velocity: [0.0],
-        };
-        let mut most = 0;
-        for tick in 0..10_000 {
-            let now = (tick, Instant::from_nanos(tick));
-            for (delay, overtakes) in [(1700, false), (1700, true), (1900, tick % 3 == 0), (7, false)] {
-                in_flight.push(now, packet(tick + delay), overtakes);
-            }
-            if let Some(bucket) = in_flight.due(tick) {
-                assert!(bucket.in_order.iter().chain(&bucket.overtaking).all(|packet| packet.arrival == now.1));
-                in_flight.reuse(bucket);
-            }
-            let lists = in_flight.wheel.iter().chain(in_flight.beyond.values().flat_map(|bucket| [&bucket.in_order, &bucket.overtaking]));
-            let memory = lists.chain(&in_flight.emptied).filter(|packets| packets.capacity() > 0).count();
-            most = most.max(memory);
-        }
-        // Two for each tick ahead up to the latest arrival.
-        assert!(most <= 2 * 1901, "{most} lists");
-        assert_eq!(in_flight.iter().count(), 2 * 1700 + 1900 + 7);
+    /// Packets of which all numbers but these are zero.
+    fn packet(place: u32, sequence: u64, arrival: u64) -> Packet<1> {
+        Packet { arrival: Instant::from_nanos(arrival), sequence, place, ..Packet::NONE }
     }
 
-    /// Packets of two links that wait in turn, beyond the wheel and within: of packets that arrive together the newest remains, and stands for the
+    /// Samples that are on the way for longer than the wheel is wide, and some that are not: all arrive at their tick, those of a link in order.
+    #[test]
+    fn late_samples_arrive_at_their_tick() {
+        let mut in_flight = InFlight::<1>::new(1);
+        let mut count = 0;
+        for tick in 0..10_000 {
+            let now = (tick, Instant::from_nanos(tick));
+            for (place, delay) in [(0, 1700), (1, 1900 - tick % 3), (2, 7)] {
+                in_flight.push(now, packet(place, tick, tick + delay), tick % 3 == 2);
+            }
+            let Some(bucket) = in_flight.due(tick) else { continue };
+            for list in bucket {
+                let packets: Vec<_> = in_flight.slices(list).flatten().collect();
+                assert!(packets.iter().all(|packet| packet.arrival == now.1));
+                assert!(packets.is_sorted_by_key(|packet| packet.sequence));
+                count += packets.len();
+            }
+            in_flight.reuse(bucket);
+        }
+        assert_eq!(in_flight.iter().count() + count, 30_000);
+        assert_eq!(in_flight.iter().filter(|packet| packet.place == 2).count(), 7);
+    }
+
+    #[test]
+    fn packets_of_a_bucket_are_removed() {
+        let mut in_flight = InFlight::<1>::new(10);
+        for (arrival, overtakes) in [(1, false), (4, true), (9, false), (10, true), (11, false)] {
+            in_flight.push((0, Instant::ZERO), packet(0, 0, arrival), overtakes);
+        }
+        let mut bucket = in_flight.due(1).unwrap();
+        in_flight.retain(&mut bucket, |packet| packet.arrival.as_nanos() <= 4);
+        let left = bucket.map(|list| in_flight.slices(list).flatten().map(|packet| packet.arrival.as_nanos()).collect::<Vec<_>>());
+        assert_eq!(left, [[1], [4]]);
+    }
+
+    /// Packets of three links that wait in turn, beyond the wheel and within: of packets that arrive together the newest remains, and stands for the
     /// packets directly before.
     #[test]
     fn a_packet_stands_for_those_that_arrive_with_it() {
         let mut in_flight = InFlight::<1>::new(1);
-        let mut latest = [0; 2];
-        let mut push = |now: u64, place: u32, sequence: u64, arrival: u64, waits: bool| {
-            let packet =
-                Packet { arrival: Instant::from_nanos(arrival), sequence, place, receiver: 0, stands_for: 0, position: [0.0], velocity: [0.0] };
+        let mut latest = [Latest::NONE; 3];
+        let mut push = |now: u64, place: u32, sequence: u32, arrival: u64, waits: bool| {
+            let packet = Packet { position: [f64::from(sequence)], ..packet(place, u64::from(sequence), arrival) };
             in_flight.push_in_order((now, Instant::from_nanos(now)), packet, waits, &mut latest[place as usize]);
         };
         for (sequence, now) in (0..).zip([0, 10, 2000, 2001, 2002]) {
@@ -247,14 +258,19 @@ mod tests {
         push(2002, 1, 10, 2500, true);
         push(2003, 1, 11, 2500, true);
         push(2003, 0, 5, 2501, false);
+        // Packet 2^16 begins anew.
+        for (sequence, now) in (65_535..).zip(2000..2003) {
+            push(now, 2, sequence, 2500, sequence > 65_535);
+        }
         let mut found = |tick: u64| {
-            let bucket = in_flight.due(tick).unwrap();
-            let mut found: Vec<_> = bucket.in_order.iter().map(|packet| (packet.place, packet.sequence, packet.stands_for)).collect();
-            found.sort_unstable();
+            let [in_order, _] = in_flight.due(tick).unwrap();
+            let packets = in_flight.slices(in_order).flatten();
+            let mut found: Vec<_> = packets.map(|packet| (packet.place, packet.sequence, packet.stands_for, packet.position[0])).collect();
+            found.sort_unstable_by_key(|(place, sequence, ..)| (*place, *sequence));
             found
         };
-        assert_eq!(found(2500), [(0, 1, 1), (0, 4, 2), (1, 8, 1), (1, 11, 1)]);
-        assert_eq!(found(2501), [(0, 5, 0)]);
+        assert_eq!(found(2500), [(0, 4, 4, 4.0), (1, 8, 1, 8.0), (1, 11, 1, 11.0), (2, 65_535, 0, 65_535.0), (2, 65_537, 1, 65_537.0)]);
+        assert_eq!(found(2501), [(0, 5, 0, 5.0)]);
     }
 
     /// At every edge: of a tick, of the range in which the reciprocal is exact, of the range of ticks that have one.

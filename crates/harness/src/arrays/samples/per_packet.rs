@@ -5,29 +5,25 @@
 
 mod direct;
 mod neighbours;
+mod received;
 
 use std::ops::Range;
 
-use cohaptic_peer::{EXACT_FROM, ExactMeans, Moving, State};
+use cohaptic_peer::{Moving, State};
 use cohaptic_scene::Scene;
 use cohaptic_units::{Ecn, Instant};
 use cohaptic_wan::{DirectLinks, LinkId, LinkModel, LinkName, LinkStats, PacketInfo, SteppedLinks};
 
 use direct::{ByChain, ByLink, BySender, DirectSending, InOrder};
+use received::Received;
 
-use super::in_flight::{Bucket, InFlight, Packet};
-use super::quads::{self, Quad};
+use super::Sample;
+use super::in_flight::{Bucket, InFlight, Latest};
 use super::rows::Rows;
-use super::{Sample, count};
 use crate::arrays::blocks::Blocks;
 use crate::arrays::processor::on_widest;
 use crate::arrays::shape::Way;
 use crate::arrays::{Shape, nanos};
-
-/// Flag in an entry of `next`: a sample of this tick and this link overtook an earlier sample.
-const IS_OVERTAKEN: u64 = 1 << 63;
-/// Number of samples taken in at once by [`PerPacket::take_in_together`].
-const TAKEN_TOGETHER: usize = 16;
 
 /// Links to some peers, samples in flight to these peers, and samples of every other peer held by each of these peers.
 ///
@@ -44,19 +40,9 @@ pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
     /// `true` if a peer sends at the present tick, indexed by peer of the scene.
     sends: Vec<bool>,
     in_flight: InFlight<A>,
-    /// Index of the latest packet of a link that keeps the order, indexed by link: see [`InFlight::push_in_order`]. Links are counted as in `links`.
-    latest: Vec<u32>,
-    /// Samples held, indexed by axis, then ordered by receiver and sender. Each receiver has whole quads, and the last quad may be padded.
-    held: [Vec<Quad<L>>; A],
-    /// Sums of the held samples, indexed by receiver; `None` if the mean of the receiver is not exact. Empty if no mean is exact. Exact means are computed in
-    /// single runs only.
-    sums: Vec<Option<ExactMeans<A>>>,
-    /// Least sequence number newer than the held sample, indexed by place, then run. 0 as long as no sample has arrived.
-    next: Vec<u64>,
-    /// Arrivals since the means were computed: bit r for run r, indexed by receiver.
-    changed: Vec<u8>,
-    /// Number of samples arrived after a newer sample, indexed by receiver, then run.
-    stale: Vec<u64>,
+    /// Latest packet of each link, indexed as `links`. Empty if links do not keep the order of packets.
+    latest: Vec<Latest>,
+    received: Received<A, L>,
 }
 
 /// Links in the form required by the shape's [`Way`].
@@ -95,41 +81,14 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
                 }
             }
         }
-        let count = receivers.len();
-        let places = rows.places(count);
-        // Only links from all peers are computed together in one loop.
-        let indexed = if let Rows::All { peers, .. } = rows { count * peers * L } else { 0 };
-        let mut samples = Self {
-            end: shape.end,
-            links,
-            sends: vec![false; peers],
-            in_flight: InFlight::new(nanos(shape.tick)),
-            latest: vec![0; if shape.way == Way::Direct { indexed } else { 0 }],
-            held: std::array::from_fn(|_| quads::empty(places)),
-            sums: Vec::new(),
-            next: vec![0; places * L],
-            changed: vec![u8::MAX; count],
-            stale: vec![0; count * L],
-            receivers,
-            rows,
+        let received = Received::new(&rows, receivers.len(), initial);
+        // Only links from all peers are computed together in one loop, and only links that keep the order have packets that arrive together.
+        let latest = match (&links, &rows) {
+            (Links::Direct(links), Rows::All { peers, .. }) if links.keep_order() => vec![Latest::NONE; receivers.len() * peers * L],
+            _ => Vec::new(),
         };
-        let Self { rows, held, .. } = &mut samples;
-        // A held sample is stored with its weight, as `Rows::packet` weighs arriving samples.
-        for (receiver, place) in (0..count).flat_map(|receiver| rows.held(receiver).map(move |place| (receiver, place))) {
-            let column = rows.column_of(receiver, place);
-            let (sample, weight) = (&initial[rows.sender(receiver, column)], rows.weight(receiver, column));
-            let weighed = |number: f64| weight.map_or(number, |weight| number * weight);
-            for (axis, run) in (0..A).flat_map(|axis| (0..L).map(move |run| (axis, run))) {
-                quads::set(&mut held[axis], place, run, weighed(sample.position[axis][run]), weighed(sample.velocity[axis][run]));
-            }
-        }
-        // With many samples the sums are kept exactly, so a single arrival costs one replacement instead of a sum over all held samples.
-        if (0..count).any(|receiver| rows.held(receiver).len() >= EXACT_FROM) {
-            let states = |receiver: usize| rows.held(receiver).map(|place| quads::state(held, place, 0)).collect::<Vec<_>>();
-            let sums = |receiver: usize| (rows.held(receiver).len() >= EXACT_FROM).then(|| ExactMeans::new(states(receiver).iter()));
-            samples.sums = (0..count).map(sums).collect();
-        }
-        samples
+        let (sends, in_flight) = (vec![false; peers], InFlight::new(nanos(shape.tick)));
+        Self { rows, receivers, end: shape.end, links, sends, in_flight, latest, received }
     }
 
     /// Sends the samples of `senders` to all receivers in their reach. `sent` holds samples indexed by peer of the scene. Each sender sends nothing further
@@ -244,64 +203,18 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     /// Returns the instant and the velocity of each held sample of a peer in a run, in the order of the peer. `sent` returns the instant of sending of the
     /// sample with a sequence number of a sender.
     pub(in crate::arrays) fn moving(&self, (peer, run): (usize, usize), sent: impl Fn(usize, u64) -> Instant) -> impl Iterator<Item = Moving<A>> {
-        self.rows.held(peer).map(move |place| {
-            let sender = self.rows.sender(peer, self.rows.column_of(peer, place));
-            let newest = self.next[place * L + run].checked_sub(1);
-            Moving {
-                sent: newest.map_or(Instant::ZERO, |newest| sent(sender, newest)),
-                velocity: std::array::from_fn(|axis| quads::velocity(&self.held[axis], place, run)),
-            }
-        })
+        self.received.moving(&self.rows, (peer, run), sent)
     }
 
     /// Returns whether any held sample of a peer in a run has changed since the means were computed.
     pub(in crate::arrays) fn has_changed(&self, peer: usize, run: usize) -> bool {
-        self.changed[peer] & (1 << run) != 0
+        self.received.has_changed(peer, run)
     }
 
     /// Computes the means of the receivers with a new sample.
     #[inline(always)]
     pub(in crate::arrays) fn refresh(&mut self, blocks: &mut Blocks) {
-        // The usual case first: rows of equal length at computed offsets, without a question for each receiver.
-        let Rows::All { peers, .. } = self.rows else { return self.refresh_unequal(blocks) };
-        if !self.sums.is_empty() {
-            return self.refresh_unequal(blocks);
-        }
-        let (quads, count) = ((peers - 1).div_ceil(4), count(peers - 1));
-        for (peer, changed) in self.changed.iter_mut().enumerate() {
-            if std::mem::take(changed) == 0 {
-                continue;
-            }
-            for axis in 0..A {
-                let (x, v) = quads::mean(&self.held[axis][peer * quads..(peer + 1) * quads], count);
-                blocks.set_target(axis, peer, x, v);
-            }
-        }
-    }
-
-    /// Like [`PerPacket::refresh`], for receivers with different numbers of heard peers or with exact means.
-    #[inline(never)]
-    fn refresh_unequal(&mut self, blocks: &mut Blocks) {
-        let Self { rows, held, sums, changed, .. } = self;
-        for (peer, changed) in changed.iter_mut().enumerate() {
-            if std::mem::take(changed) == 0 {
-                continue;
-            }
-            let places = rows.held(peer);
-            if let Some(Some(sums)) = sums.get(peer) {
-                let mean = sums.mean(places.len());
-                for axis in 0..A {
-                    blocks.set_target(axis, peer, [mean.position[axis]; L], [mean.velocity[axis]; L]);
-                }
-                continue;
-            }
-            // The padding of the last quad is −0, whose addition changes no sum, so whole quads can be summed.
-            let (quads, count) = (places.start / 4..places.end.div_ceil(4), count(places.len()));
-            for (axis, held) in held.iter().enumerate() {
-                let (x, v) = quads::mean(&held[quads.clone()], count);
-                blocks.set_target(axis, peer, x, v);
-            }
-        }
+        self.received.refresh(&self.rows, blocks);
     }
 
     /// Takes in the samples arrived by the end of the scene. The end is at or before the tick after `latest`.
@@ -309,134 +222,16 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         self.pass(latest, &|_| Instant::MAX);
         // The bucket belongs to the tick at or after the end. Packets with an arrival between the end and this tick are removed.
         if let Some(mut bucket) = self.in_flight.due(latest.0 + 1) {
-            for packets in [&mut bucket.in_order, &mut bucket.overtaking] {
-                packets.retain(|packet| packet.arrival <= self.end);
-            }
+            self.in_flight.retain(&mut bucket, |packet| packet.arrival <= self.end);
             self.take_in(bucket);
         }
     }
 
-    /// Takes in arrived samples.
-    ///
-    /// The order among links does not matter: of each link the newest sample stays, and sums of samples are exact. Samples are therefore taken in unsorted,
-    /// from receiver to receiver. Samples of links with overtaking come last, sorted, because their order decides which samples are stale.
+    /// Takes in arrived samples. Not inlined, because the loops over samples are not part of the loop over ticks.
     #[inline(never)]
-    fn take_in(&mut self, mut bucket: Bucket<A>) {
-        // Mark the links first: the samples of marked links in `in_order` must wait for the sorted pass too.
-        for packet in &bucket.overtaking {
-            self.next[packet.place as usize] |= IS_OVERTAKEN;
-        }
-        // Samples appended below belong to marked links, but did not mark the links.
-        let overtaking = bucket.overtaking.len();
-        // Without exact means there are no sums to update.
-        match self.sums.is_empty() {
-            true => self.take_in_order(&mut bucket),
-            false => self.take_in_together(&mut bucket),
-        }
-        if overtaking > 0 {
-            self.take_in_overtaking(&mut bucket.overtaking, overtaking);
-        }
+    fn take_in(&mut self, bucket: Bucket) {
+        self.received.take_in(&self.in_flight, bucket);
         self.in_flight.reuse(bucket);
-    }
-
-    /// Takes in the samples of links without overtaking. Appends the other samples to `bucket.overtaking`.
-    #[inline(always)]
-    fn take_in_order(&mut self, bucket: &mut Bucket<A>) {
-        for packet in &bucket.in_order {
-            if self.is_newest(packet, &mut bucket.overtaking) {
-                self.hold(packet);
-            }
-        }
-    }
-
-    /// Like [`PerPacket::take_in_order`], for exact means. Takes in several samples at once, so the reads of held samples overlap before the sums need the
-    /// samples: these samples are more than a cache holds.
-    #[inline(always)]
-    fn take_in_together(&mut self, bucket: &mut Bucket<A>) {
-        for packets in bucket.in_order.chunks(TAKEN_TOGETHER) {
-            let (mut newest, mut count) = ([0; TAKEN_TOGETHER], 0);
-            for (place, packet) in packets.iter().enumerate() {
-                // Written in any case and counted only if newest: no branch.
-                newest[count] = place;
-                count += usize::from(self.is_newest(packet, &mut bucket.overtaking));
-            }
-            // Each sample is held as soon as the sample before is read, so a second sample of the same link in this chunk replaces the first.
-            let mut before = [State { position: [0.0; A], velocity: [0.0; A] }; TAKEN_TOGETHER];
-            for (place, before) in newest[..count].iter().zip(&mut before) {
-                let packet = &packets[*place];
-                *before = quads::state(&self.held, packet.place as usize / L, packet.place as usize % L);
-                self.hold(packet);
-            }
-            for (place, before) in newest[..count].iter().zip(&before) {
-                self.replace(before, &packets[*place]);
-            }
-        }
-    }
-
-    /// Returns whether a sample is newer than the held sample, and notes its sequence number if so. Appends a sample of a marked link to `overtaking`.
-    #[inline(always)]
-    fn is_newest(&mut self, packet: &Packet<A>, overtaking: &mut Vec<Packet<A>>) -> bool {
-        let next = &mut self.next[packet.place as usize];
-        // A marked entry has its top bit set, so no sequence number reaches it.
-        let is_newest = packet.sequence >= *next;
-        if is_newest {
-            *next = packet.sequence + 1;
-        } else if *next & IS_OVERTAKEN == 0 {
-            self.count_stale(packet);
-        } else {
-            overtaking.push(*packet);
-        }
-        is_newest
-    }
-
-    /// Takes in all samples of marked links, in the order of arrival. The first `overtaking` packets have marked their links.
-    fn take_in_overtaking(&mut self, packets: &mut [Packet<A>], overtaking: usize) {
-        for packet in &packets[..overtaking] {
-            self.next[packet.place as usize] &= !IS_OVERTAKEN;
-        }
-        // A stable order is not needed: the arrival and the sequence number tell all packets of a link apart.
-        packets.sort_unstable_by_key(|packet| (packet.arrival, packet.sequence));
-        for packet in &*packets {
-            self.take_in_one(packet);
-        }
-    }
-
-    /// Takes in a sample, after all earlier arrivals of its link.
-    #[inline(always)]
-    fn take_in_one(&mut self, packet: &Packet<A>) {
-        let next = &mut self.next[packet.place as usize];
-        if packet.sequence >= *next {
-            *next = packet.sequence + 1;
-            let before = quads::state(&self.held, packet.place as usize / L, packet.place as usize % L);
-            self.replace(&before, packet);
-            self.hold(packet);
-        } else {
-            self.count_stale(packet);
-        }
-    }
-
-    /// Replaces the sample `before` by the sample of `packet` in the sums of the receiver, if the receiver has sums.
-    #[inline(always)]
-    fn replace(&mut self, before: &State<A>, packet: &Packet<A>) {
-        if let Some(Some(sums)) = self.sums.get_mut(usize::from(packet.receiver)) {
-            sums.replace(before, &State { position: packet.position, velocity: packet.velocity });
-        }
-    }
-
-    /// Holds a sample: replaces the held sample and marks the mean as out of date.
-    #[inline(always)]
-    fn hold(&mut self, packet: &Packet<A>) {
-        let (place, run) = (packet.place as usize / L, packet.place as usize % L);
-        for axis in 0..A {
-            quads::set(&mut self.held[axis], place, run, packet.position[axis], packet.velocity[axis]);
-        }
-        self.changed[usize::from(packet.receiver)] |= 1 << run;
-    }
-
-    #[cold]
-    fn count_stale(&mut self, packet: &Packet<A>) {
-        // The packets that `packet` stands for have lower sequence numbers, so that all of them are stale too.
-        self.stale[usize::from(packet.receiver) * L + packet.place as usize % L] += 1 + u64::from(packet.stands_for);
     }
 
     /// Ends a run at the instant `at` before the end of the scene: samples still in flight never arrive, and links do nothing more.
@@ -464,7 +259,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
 
     /// Returns the number of samples taken in by a receiver after a newer sample.
     pub(in crate::arrays) fn stale_samples(&self, receiver: usize, run: usize) -> u64 {
-        self.stale[receiver * L + run]
+        self.received.stale_samples(receiver, run)
     }
 
     /// Returns the counters of the link from a peer of the scene to a receiver; `None` if there is no link.

@@ -7,7 +7,7 @@ use cohaptic_wan::{Arrivals, DirectLinks, LinkId};
 use pulp::NullaryFnOnce;
 
 use super::super::Sample;
-use super::super::in_flight::{InFlight, Packet};
+use super::super::in_flight::{InFlight, Latest, Packet};
 
 /// Packets of a tick over direct links, if all peers hear all other peers.
 ///
@@ -23,7 +23,7 @@ pub(super) struct DirectSending<'a, const A: usize, const L: usize> {
     pub(super) sent: &'a [Sample<A, L>],
     pub(super) in_flight: &'a mut InFlight<A>,
     /// See [`PerPacket::latest`](super::PerPacket).
-    pub(super) latest: &'a mut [u32],
+    pub(super) latest: &'a mut [Latest],
     /// Present tick and its instant.
     pub(super) at: (u64, Instant),
 }
@@ -118,14 +118,19 @@ impl<const A: usize, const L: usize> DirectSending<'_, A, L> {
     /// Sends sender by sender, one link at a time, in a single run.
     #[inline(always)]
     fn by_sender(self) {
-        let Self { peers, receivers, links, senders, sent, in_flight, at, .. } = self;
+        let Self { peers, receivers, links, senders, sent, in_flight, latest, at, .. } = self;
         for sender in senders {
             for to in receivers.clone().enumerate().filter(|(_, peer)| peer != sender) {
                 let link = LinkId::new(to.0 * peers + sender);
                 // The sequence number is the number of packets offered before, so it is read before the packet is offered.
                 let sequence = links.offered(link);
                 if let Some((arrival, overtakes)) = links.offer_one(at.1, link) {
-                    in_flight.push(at, packet(peers, to, *sender, sent, arrival, sequence), overtakes);
+                    let packet = packet(peers, to, *sender, sent, arrival, sequence);
+                    match latest.get_mut(link.index()) {
+                        // Whether the packet waits is not known here, which costs memory only.
+                        Some(latest) => in_flight.push_in_order(at, packet, false, latest),
+                        None => in_flight.push(at, packet, overtakes),
+                    }
                 }
             }
         }
