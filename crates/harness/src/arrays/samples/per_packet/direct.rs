@@ -101,11 +101,13 @@ impl<const A: usize, const L: usize> DirectSending<'_, A, L> {
             }
             links.offer_as::<CHAINS>(at.1, LinkId::new(first), together, but, &mut arrivals);
             for place in arrivals.places() {
-                while first + place >= end {
+                // With as many runs as links at once, all eight links are of one sender and one receiver.
+                while const { L < DirectLinks::AT_ONCE } && first + place >= end {
                     (receiver, end) = (receiver + 1, end + row);
                 }
-                let to = (receiver, receivers.start + receiver);
-                let packet = packet(peers, to, first + place + row - end, sent, arrivals.at[place], arrivals.sequences[place]);
+                let (to, link) = ((receiver, receivers.start + receiver), first + place + row - end);
+                let from = if const { L == DirectLinks::AT_ONCE } { ((first + row - end) / L, place) } else { (link / L, link % L) };
+                let packet = packet(peers, to, from, sent, arrivals.at[place], arrivals.sequences[place]);
                 if ORDER {
                     in_flight.push_in_order(at, packet, arrivals.waits(place), &mut latest[first + place]);
                 } else {
@@ -125,7 +127,7 @@ impl<const A: usize, const L: usize> DirectSending<'_, A, L> {
                 // The sequence number is the number of packets offered before, so it is read before the packet is offered.
                 let sequence = links.offered(link);
                 if let Some((arrival, overtakes)) = links.offer_one(at.1, link) {
-                    let packet = packet(peers, to, *sender, sent, arrival, sequence);
+                    let packet = packet(peers, to, (*sender, 0), sent, arrival, sequence);
                     match latest.get_mut(link.index()) {
                         // Whether the packet waits is not known here, which costs memory only.
                         Some(latest) => in_flight.push_in_order(at, packet, false, latest),
@@ -137,19 +139,17 @@ impl<const A: usize, const L: usize> DirectSending<'_, A, L> {
     }
 }
 
-/// Returns the packet over the link at index `link` of a row, to a receiver, the peer `peer` of the scene, if all peers hear all other peers. A row is
-/// ordered by sender, then run.
+/// Returns the packet from the peer `sender` of the scene to a receiver, the peer `peer` of the scene, in a run, if all peers hear all other peers.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "peers are counted in 16 bits, what they hold in 32")]
 fn packet<const A: usize, const L: usize>(
     peers: usize,
     (receiver, peer): (usize, usize),
-    link: usize,
+    (sender, run): (usize, usize),
     sent: &[Sample<A, L>],
     arrival: Instant,
     sequence: u64,
 ) -> Packet<A> {
-    let (sender, run) = (link / L, link % L);
     let sample = &sent[sender];
     Packet {
         arrival,
