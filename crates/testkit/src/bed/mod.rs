@@ -14,11 +14,13 @@ mod standard;
 #[cfg(feature = "tcp")]
 mod tcp;
 
+use std::cell::RefCell;
 #[cfg(feature = "tcp")]
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::panic::{AssertUnwindSafe, Location, catch_unwind, resume_unwind};
 use std::path::PathBuf;
+use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -37,6 +39,7 @@ use crate::names::Names;
 use crate::record::Record;
 use crate::seed::{Place, Seed};
 use crate::setup::Setup;
+use crate::task::Program;
 #[cfg(feature = "tcp")]
 use crate::tcp::TcpConfig;
 use crate::trace::Trace;
@@ -328,17 +331,34 @@ impl Testbed {
         F: Future<Output = T> + 'static,
         T: 'static,
     {
+        let outcome = Rc::new(RefCell::new(None));
+        let slot = Rc::clone(&outcome);
+        let program = |bed| -> Program {
+            // Boxed by itself, because a program may hold arrays, and without optimisation each future around it would keep a copy on the stack.
+            let future = Box::pin(program(bed));
+            Box::pin(async move {
+                let came_out = future.await;
+                *slot.borrow_mut() = Some(came_out);
+            })
+        };
+        let record = self.run_boxed(seed, Box::new(program), origin);
+        (outcome.take().expect("a run ends with its program, or panics"), record)
+    }
+
+    /// Not generic, so that the compiler translates both executors once, with the test kit, and not for each program.
+    fn run_boxed(self, seed: &Seed, program: Box<dyn FnOnce(Bed) -> Program + '_>, origin: &'static Location<'static>) -> Record {
         #[cfg(feature = "tokio")]
-        if self.is_tokio {
-            return self.run_with(seed, origin, |core, hosts, watched, recorded| {
+        let is_tokio = self.is_tokio;
+        let execute = |core, hosts, watched: &Watched, recorded: &mut Option<Recorded>| {
+            #[cfg(feature = "tokio")]
+            if is_tokio {
                 #[cfg(feature = "facade")]
                 cohaptic_sockets::seed_next_runtime(seed.value);
-                crate::runtime::on_tokio::run(core, hosts, |shared| program(Bed::new(shared)), origin, watched, recorded)
-            });
-        }
-        self.run_with(seed, origin, |core, hosts, watched, recorded| {
-            crate::runtime::own::run(core, hosts, |shared| program(Bed::new(shared)), origin, watched, recorded)
-        })
+                return crate::runtime::on_tokio::run(core, hosts, |shared| program(Bed::new(shared)), origin, watched, recorded);
+            }
+            crate::runtime::own::run(core, hosts, |shared| program(Bed::new(shared)), origin, watched, recorded);
+        };
+        self.run_with(seed, origin, execute).1
     }
 
     /// Makes the state of a run, calls `execute` with the state and the number of hosts, and reports a failure.

@@ -14,7 +14,7 @@
 //! Tokio calls a hook before parking its thread, when all tasks wait. The hook moves the clock from event to event until an event wakes a task, so tokio does
 //! not park meanwhile. Before a jump of tokio, the hook wakes a task of this module, the pump. The pump sets the timer for the jump.
 
-use std::cell::RefCell;
+use std::cell::Cell;
 use std::future::{Future, poll_fn};
 use std::panic::Location;
 use std::pin::{Pin, pin};
@@ -36,7 +36,7 @@ use super::own::{Executor, is_any_ready, time_stands_still};
 use super::recorder::Recorder;
 use crate::core::{Clock, Core, Shared};
 use crate::failure::__rust_begin_short_backtrace;
-use crate::task::{JoinHandle, Tasks};
+use crate::task::{JoinHandle, Program, Tasks};
 use crate::watch::{Pulse, Watched};
 use crate::wire::Recorded;
 
@@ -269,18 +269,14 @@ impl<'a> Begun<'a> {
 ///
 /// As [`Testbed::run`](crate::Testbed::run).
 #[expect(clippy::panic, reason = "a misuse, and the way out")]
-pub(crate) fn run<T, F>(
+pub(crate) fn run(
     core: Core,
     hosts: usize,
-    program: impl FnOnce(Arc<Shared>) -> F,
+    program: impl FnOnce(Arc<Shared>) -> Program,
     origin: &'static Location<'static>,
     watched: &Watched,
     recorded: &mut Option<Recorded>,
-) -> T
-where
-    F: Future<Output = T> + 'static,
-    T: 'static,
-{
+) {
     if tokio::runtime::Handle::try_current().is_ok() {
         panic!(
             "a test bed on tokio starts a runtime, which cannot run inside another runtime: use a plain `#[test]` in place of `#[tokio::test]`, and call \
@@ -298,11 +294,11 @@ where
         let mut set = LocalSet::new();
         let _local = set.enter();
         let _here = begun.shared.stay();
-        let outcome = Rc::new(RefCell::new(None));
-        let (future, slot) = (Box::pin(program(Arc::clone(&begun.shared))), Rc::clone(&outcome));
+        let is_over = Rc::new(Cell::new(false));
+        let (program, over) = (program(Arc::clone(&begun.shared)), Rc::clone(&is_over));
         let main = begun.tasks.spawn(None, origin, async move {
-            let came_out = future.await;
-            *slot.borrow_mut() = Some(came_out);
+            program.await;
+            over.set(true);
         });
         let mut beside = pin!(poll_fn(|cx| {
             // A set without tasks is ready. The set is polled again once the set has a task.
@@ -310,8 +306,8 @@ where
             Poll::Pending
         }));
         drive(&begun, Some(main), beside.as_mut()).await;
-        outcome.take().unwrap_or_else(|| panic!("the program was stopped before its end: do not abort the program or the runtime"))
-    })
+        assert!(is_over.get(), "the program was stopped before its end: do not abort the program or the runtime");
+    });
 }
 
 /// Runs a future of another program as a task of `host` until the future is over. `block_on` runs the given future on a runtime whose builder was prepared by

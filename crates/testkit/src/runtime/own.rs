@@ -19,7 +19,7 @@ use super::entered::enter;
 use super::limits::{goes_on, nothing_will_happen};
 use super::recorder::Recorder;
 use crate::core::{Clock, Core, Shared};
-use crate::task::{Spawner, Task, Tasks};
+use crate::task::{Program, Spawner, Task, Tasks};
 use crate::watch::Watched;
 use crate::wire::Recorded;
 
@@ -396,18 +396,14 @@ impl Executor {
 }
 
 /// Runs a program on the executor of this crate.
-pub(crate) fn run<T, F>(
+pub(crate) fn run(
     core: Core,
     hosts: usize,
-    program: impl FnOnce(Arc<Shared>) -> F,
+    program: impl FnOnce(Arc<Shared>) -> Program,
     origin: &'static Location<'static>,
     watched: &Watched,
     recorded: &mut Option<Recorded>,
-) -> T
-where
-    F: Future<Output = T> + 'static,
-    T: 'static,
-{
+) {
     let executor = Executor::new();
     let mut core = core;
     core.woken.trust(&executor.waker());
@@ -419,15 +415,13 @@ where
     let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
     // After `enter`, because `enter` checks that no second test bed runs on this thread.
     let _here = shared.stay();
-    let outcome = Rc::new(RefCell::new(None));
-    // Boxed, because a program may hold arrays, and without optimisation each call to which a future is passed keeps a copy on the stack.
-    let (future, slot) = (Box::pin(program(Arc::clone(&shared))), Rc::clone(&outcome));
+    let is_over = Rc::new(Cell::new(false));
+    let (program, over) = (program(Arc::clone(&shared)), Rc::clone(&is_over));
     let _main = tasks.spawn(None, origin, async move {
-        let came_out = future.await;
-        *slot.borrow_mut() = Some(came_out);
+        program.await;
+        over.set(true);
     });
-    executor.run(&shared, &tasks, || outcome.borrow().is_some());
-    outcome.take().expect("the executor runs until the program is over")
+    executor.run(&shared, &tasks, || is_over.get());
 }
 
 /// Fails the run, because tasks are polled again and again and time does not pass. `last` is the task that was polled last.
