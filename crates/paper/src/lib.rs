@@ -8,7 +8,7 @@
 //! The crate reads no clock, draws no random numbers and prints nothing: equal options give equal bytes. The impressions of the paper's test persons are
 //! not reproduced. If the paper's printed parameters do not give its printed numbers, the claims say so.
 //!
-//! ```
+//! ```no_run
 //! use cohaptic_paper::{Options, Unwatched, Verdict, reproduce};
 //!
 //! let reproduction = reproduce(Options { quick: true, ..Options::default() }, &Unwatched)?;
