@@ -8,13 +8,15 @@
 //! The crate reads no clock, draws no random numbers and prints nothing: equal options give equal bytes. The impressions of the paper's test persons are
 //! not reproduced. If the paper's printed parameters do not give its printed numbers, the claims say so.
 //!
-//! ```no_run
+//! ```
+//! # fn compiled() -> Result<(), cohaptic_paper::PaperError> {
 //! use cohaptic_paper::{Options, Unwatched, Verdict, reproduce};
 //!
 //! let reproduction = reproduce(Options { quick: true, ..Options::default() }, &Unwatched)?;
 //! let claim = reproduction.claims.iter().find(|claim| claim.id == "any-number").expect("it is a claim of the paper");
 //! assert_eq!(claim.verdict, Verdict::Holds);
-//! # Ok::<(), cohaptic_paper::PaperError>(())
+//! # Ok(())
+//! # }
 //! ```
 
 mod case;
