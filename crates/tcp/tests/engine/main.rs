@@ -16,6 +16,7 @@ mod fuzz;
 mod recovery;
 mod rows;
 mod smoltcp;
+mod tables;
 mod timing;
 mod traps;
 mod world;

@@ -1,4 +1,4 @@
-//! Seconds from `connect` to the last octet, beside those of Linux 6.18 over the same links (`examples/table.rs` has all rows and seeds).
+//! Seconds from `connect` to the last octet, beside those of Linux 6.18 over the same links ([`tables`](crate::tables) has all rows and seeds).
 
 use std::time::Duration;
 
