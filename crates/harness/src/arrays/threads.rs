@@ -279,7 +279,9 @@ mod tests {
             }
         });
         let in_groups = run_in_groups::<1>(scene, &shape, law, (threads, 1), &mut one);
-        (in_groups, crate::arrays::run(scene, shape, law, &mut other))
+        // `arrays::run` would compile the loops for three axes too, for scenes of one axis.
+        let [together] = Arrays::<1, 1>::new([scene], shape, [law], None).run(Unwatched(&mut other));
+        (in_groups, together)
     }
 
     /// Covers links of all kinds, phases, neighbours, a timeline with a change between two meetings, and an observer that ends the run between two meetings.

@@ -16,6 +16,7 @@ mod scenes;
 mod seats;
 mod silence;
 mod tasks;
+mod travel;
 mod turning_energy;
 mod turning_laws;
 mod virtual_time;
