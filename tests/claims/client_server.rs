@@ -10,6 +10,7 @@ use cohaptic_harness::Model;
 use cohaptic_peer::coordination::LawValue;
 use cohaptic_peer::{Contact, Coordination, Gains};
 use cohaptic_tests::{Draft, DraftHand, Log, run};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 use proptest::sample::select;
 
@@ -21,7 +22,7 @@ fn felt_at(draft: &Draft) -> Option<u64> {
     log.of(2).iter().position(|tick| tick.coupling_force[0] != 0.0).map(|tick| tick as u64)
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(100))]
 
     #[test]

@@ -18,6 +18,7 @@ use cohaptic_proofs::{Effort, Links, Patterns, WorstVerdict, worst_case};
 use cohaptic_scene::Scene;
 use cohaptic_stability::{Method, Verdict, analyse};
 use cohaptic_tests::{Draft, DraftHand, Log, Tick, links, run};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -170,7 +171,7 @@ pub(crate) fn damped(draft: &mut Draft, more: f64) -> f64 {
     age
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(200))]
 
     /// The claim at the bound, and above it.
@@ -229,7 +230,7 @@ fn the_tick_itself_is_part_of_the_age() {
     assert_eq!(analyse(&draft.scene(), Method::Reduced).unwrap().verdict(), Verdict::Stable);
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(40))]
 
     /// The same by the analysis, with nothing simulated, for any number of peers with AP: no pattern of at most so many losses in a row makes a disturbance grow,

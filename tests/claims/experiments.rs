@@ -13,13 +13,14 @@
 use cohaptic_peer::{ArmConfig, Coordination};
 use cohaptic_stability::Verdict;
 use cohaptic_tests::DraftHand;
+use cohaptic_tests_common::properties;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
 use crate::claims::cases;
 use crate::claims::paper::{BOTH, nominal, paper};
 
-proptest! {
+properties! {
     #![proptest_config(cases(150))]
 
     #[test]

@@ -15,6 +15,7 @@ use cohaptic_harness::Model;
 use cohaptic_peer::Coordination;
 use cohaptic_stability::{Admittance, Verdict, ideal};
 use cohaptic_tests::{Draft, DraftHand, run};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use crate::claims::cases;
@@ -26,7 +27,7 @@ fn viscosity(draft: &Draft) -> Option<f64> {
     (admittance.verdict() == Verdict::Stable).then(|| admittance.fit_low_frequency().viscosity.value)
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(150))]
 
     #[test]
@@ -60,7 +61,7 @@ fn distances(peers: usize, touching: usize, hz: f64) -> [f64; 2] {
     })
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(150))]
 
     #[test]
@@ -87,7 +88,7 @@ fn travel(draft: &Draft) -> Option<usize> {
     run(&draft.scene(), Model::Least).of(0).iter().position(|tick| tick.object.position[0] >= 0.02)
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(60))]
 
     #[test]

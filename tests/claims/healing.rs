@@ -12,6 +12,7 @@ use std::time::Duration;
 use cohaptic_harness::Model;
 use cohaptic_peer::{Contact, Gains};
 use cohaptic_tests::{Draft, DraftHand, links, run};
+use cohaptic_tests_common::properties;
 use cohaptic_wan::Fate;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -56,7 +57,7 @@ fn healed(draft: &Draft, delay: u64) -> Draft {
     healed
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(80))]
 
     #[test]

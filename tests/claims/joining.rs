@@ -16,6 +16,7 @@ use cohaptic_peer::wire::MAX_LEN;
 use cohaptic_peer::{ArmConfig, Contact, Gains, Held, ObjectCopy, Peer, RestingDevice, State};
 use cohaptic_scene::Scene;
 use cohaptic_tests::{Draft, DraftHand, DraftLink, links, run};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -147,7 +148,7 @@ fn lives() -> impl Strategy<Value = Vec<Life>> {
     })
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(80))]
 
     #[test]

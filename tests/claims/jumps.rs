@@ -16,6 +16,7 @@
 use cohaptic_harness::Model;
 use cohaptic_peer::{Contact, Gains};
 use cohaptic_tests::{Draft, DraftHand, Log, Tick, links, run};
+use cohaptic_tests_common::properties;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
@@ -80,7 +81,7 @@ fn pushed() -> impl Strategy<Value = Draft> {
     })
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(150))]
 
     /// Stable or not, whatever the links do.

@@ -13,6 +13,7 @@ use cohaptic_harness::Model;
 use cohaptic_peer::Coordination;
 use cohaptic_peer::coordination::LawValue;
 use cohaptic_tests::{Draft, run};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use crate::claims::energy::{heavy, springs};
@@ -24,7 +25,7 @@ fn with_damping(draft: &mut Draft, damping: f64) {
     draft.settings.of_mut(Coordination::LocalDamping).set(0, LawValue::Number(damping));
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(200))]
 
     /// At the bound and above it, over any network and without damping of the object or with it.

@@ -10,6 +10,7 @@ use cohaptic_peer::Coordination;
 use cohaptic_peer::Gains;
 use cohaptic_peer::coordination::{Law, LawValue};
 use cohaptic_tests::{Draft, run};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 use proptest::sample::select;
 
@@ -31,7 +32,7 @@ fn forces(draft: &Draft, model: Model) -> Vec<f64> {
     ticks.chunks_exact(draft.peers.len()).map(largest).collect()
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(150))]
 
     #[test]

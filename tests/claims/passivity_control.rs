@@ -8,6 +8,7 @@ use cohaptic_peer::wire::SampleKind;
 use cohaptic_peer::{Command, Context, Coordination, Gains, Held, State};
 use cohaptic_scene::{Scene, Strategies};
 use cohaptic_tests::{Draft, keep, run};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use crate::claims::cases;
@@ -19,7 +20,7 @@ fn with_reserve(draft: &mut Draft, reserve: f64) {
     draft.settings.of_mut(Coordination::PassivityControl).set(0, LawValue::Number(reserve));
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(150))]
 
     #[test]

@@ -24,6 +24,7 @@
 use cohaptic_peer::{Coordination, Gains};
 use cohaptic_stability::{Method, QUICK_UNKNOWNS, Verdict, judge};
 use cohaptic_tests::Draft;
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use crate::claims::energy::least_damping;
@@ -48,7 +49,7 @@ fn verdict(draft: &Draft) -> Verdict {
     judged.verdict
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(200))]
 
     #[test]
@@ -94,7 +95,7 @@ proptest! {
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(60))]
 
     #[test]

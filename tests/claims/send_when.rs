@@ -9,6 +9,7 @@ use cohaptic_harness::Model;
 use cohaptic_peer::SendWhen;
 use cohaptic_scene::Scene;
 use cohaptic_tests::{Draft, Log, drafts, run};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use crate::claims::cases;
@@ -26,7 +27,7 @@ fn read(name: &str, changes: &[&str]) -> Scene {
     Scene::read(&file, &changes).unwrap_or_else(|error| panic!("{error}"))
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(100))]
 
     #[test]

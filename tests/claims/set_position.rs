@@ -8,6 +8,7 @@ use cohaptic_peer::Coordination;
 use cohaptic_peer::coordination::LawValue;
 use cohaptic_scene::Scene;
 use cohaptic_tests::{Draft, run};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use crate::claims::energy::springs;
@@ -32,7 +33,7 @@ fn with(draft: &mut Draft, values: [f64; 3]) {
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(150))]
 
     #[test]

@@ -14,6 +14,7 @@
 use cohaptic_harness::Model;
 use cohaptic_peer::{Coordination, Gains};
 use cohaptic_tests::{Draft, run};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use crate::claims::paper::{BOTH, with};
@@ -37,7 +38,7 @@ fn apart(peers: usize, stiffness: f64, split_mass: bool) -> Draft {
     draft
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(60))]
 
     /// To 10⁻⁹: rounding of positions, 10⁻¹⁸ m, in second differences of some 10⁻⁶ m.

@@ -8,13 +8,14 @@ use cohaptic_peer::Coordination;
 use cohaptic_peer::coordination::LawValue;
 use cohaptic_scene::Scene;
 use cohaptic_tests::run;
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use crate::claims::cases;
 use crate::claims::energy::springs;
 use crate::claims::injected::Injected;
 
-proptest! {
+properties! {
     #![proptest_config(cases(200))]
 
     #[test]

@@ -5,6 +5,7 @@ use std::time::Duration;
 use cohaptic_harness::{Ending, Model, NoObserver, Observer, Simulation, Summary, run_side_by_side, same_shape};
 use cohaptic_scene::Scene;
 use cohaptic_tests::{Draft, are_all, cases, drafts, shipped_scenes};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 
@@ -91,7 +92,7 @@ pub(super) fn run_interrupted(scene: &Scene, model: Model, breaths: usize) -> Su
     summary
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(1500))]
 
     #[test]
@@ -103,7 +104,7 @@ proptest! {
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(150))]
 
     /// Samples that overtake each other in a tick, over ticks, and beyond those that are looked ahead, sent as often as peers tick.
@@ -122,7 +123,7 @@ proptest! {
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(300))]
 
     #[test]

@@ -6,6 +6,7 @@ use cohaptic_harness::Model;
 use cohaptic_peer::Coordination;
 use cohaptic_peer::coordination::LawValue;
 use cohaptic_tests::{Draft, DraftPeer, cases, drafts, run};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use cohaptic_wan::Fate;
 use proptest::prelude::*;
@@ -23,7 +24,7 @@ fn fates(draft: &Draft) -> Fates {
     fates
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(500))]
 
     #[test]

@@ -8,6 +8,7 @@ use cohaptic_peer::coordination::{LawForm, LawSettings, LawValue};
 use cohaptic_peer::{Contact, Coordination, Direction, Gains, Hand, Signal};
 use cohaptic_scene::{Change, ChangeKind, LinkChange, Scene};
 use cohaptic_tests::{Draft, cases, drafts};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -35,7 +36,7 @@ fn compare(scene: &Scene, rows: bool) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(800))]
 
     #[test]
@@ -88,7 +89,7 @@ fn settings(law: Coordination, micros: u64) -> LawSettings {
     settings
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(200))]
 
     #[test]

@@ -6,6 +6,7 @@ use cohaptic_harness::{Ending, Model};
 use cohaptic_peer::Drift;
 use cohaptic_scene::Scene;
 use cohaptic_tests::{are_all, cases, drafts};
+use cohaptic_tests_common::properties;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -18,7 +19,7 @@ fn clocks() -> impl Strategy<Value = Vec<(u64, i32)>> {
     prop_oneof![vec((offset.clone(), Just(0)), 11), vec((offset.clone(), -100_000..100_000_i32), 11), vec((offset, drift), 11),]
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(200))]
 
     #[test]

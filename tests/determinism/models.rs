@@ -7,10 +7,11 @@ use std::time::Duration;
 use cohaptic_harness::{Model, NoObserver, Observer, Simulation, TickRow};
 use cohaptic_scene::Scene;
 use cohaptic_tests::{cases, drafts, first_difference, record, run, shipped_scenes};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 
-proptest! {
+properties! {
     #![proptest_config(cases(1500))]
 
     #[test]
@@ -34,7 +35,7 @@ proptest! {
     }
 }
 
-proptest! {
+properties! {
     // Each case writes twelve files.
     #![proptest_config(cases(100))]
 

@@ -8,6 +8,7 @@ use cohaptic_peer::Gains;
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_scene::{Change, ChangeKind, Scene, Topology};
 use cohaptic_tests::{Draft, cases, drafts};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 
@@ -71,7 +72,7 @@ fn written(keys: &str, draft: &Draft, line: (f64, i64), tokens: (f64, i64)) -> S
     format!("{before}{}{after}", size + more.parse::<usize>().unwrap())
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(300))]
 
     /// The timeline makes links others, while samples are on lines and before them.
@@ -93,7 +94,7 @@ proptest! {
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(600))]
 
     #[test]

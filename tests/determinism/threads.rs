@@ -2,9 +2,10 @@
 
 use cohaptic_harness::Model;
 use cohaptic_tests::{Records, cases, drafts, record};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
-proptest! {
+properties! {
     // Each case writes thirty files.
     #![proptest_config(cases(40))]
 

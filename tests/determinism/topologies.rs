@@ -5,6 +5,7 @@ use std::sync::Arc;
 use cohaptic_harness::{Model, NoObserver, Simulation, Summary, run_side_by_side, same_shape};
 use cohaptic_scene::{ChangeKind, Scene, Topology};
 use cohaptic_tests::{Draft, cases, drafts, record};
+use cohaptic_tests_common::properties;
 use cohaptic_units::parse;
 use proptest::prelude::*;
 
@@ -39,7 +40,7 @@ fn on(draft: &Draft, (kind, numbers): &(u8, Vec<f64>)) -> Option<Scene> {
     scene.law(0).is_some().then_some(Scene { topology: Some(Arc::new(topology)), ..scene })
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(600))]
 
     #[test]
@@ -53,7 +54,7 @@ proptest! {
     }
 }
 
-proptest! {
+properties! {
     // Each case writes many files.
     #![proptest_config(cases(60))]
 

@@ -7,6 +7,7 @@ use cohaptic_peer::rotation::{Attitude, Spin, Triple};
 use cohaptic_peer::{Coordination, Gains, Signal};
 use cohaptic_scene::{DeviceRotationSpec, PeerRotation, RotationSpec, Scene};
 use cohaptic_tests::{Draft, cases, drafts};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Hertz;
 use proptest::collection::vec;
 use proptest::option;
@@ -91,7 +92,7 @@ pub(super) fn scene() -> impl Strategy<Value = Scene> {
     })
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(300))]
 
     #[test]
@@ -101,7 +102,7 @@ proptest! {
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(80))]
 
     #[test]

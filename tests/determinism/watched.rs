@@ -6,6 +6,7 @@ use cohaptic_harness::{Ending, InstantRow, Model, Observer, Simulation, Summary,
 use cohaptic_peer::Contact;
 use cohaptic_scene::Scene;
 use cohaptic_tests::{cases, drafts};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 
@@ -110,7 +111,7 @@ pub(super) fn found(scene: &Scene, change: impl Fn(&mut Keeper)) -> Option<Strin
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(400))]
 
     #[test]
@@ -120,7 +121,7 @@ proptest! {
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(30))]
 
     /// An observer that ends a run, or fails, has seen what it would have seen of events.

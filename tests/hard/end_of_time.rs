@@ -8,6 +8,7 @@ use cohaptic_peer::{Clock, Drift};
 use cohaptic_scene::Scene;
 use cohaptic_testkit::node::{Node, Nodes, Packet, Transmit};
 use cohaptic_tests::{Log, first_difference, run, same_cases};
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant, Rate};
 use cohaptic_wan::{Delay, DropCause, Event, EventQueue, Fate, LinkConfig};
 use proptest::collection::vec;
@@ -22,7 +23,7 @@ fn span() -> impl Strategy<Value = Duration> {
     prop_oneof![3 => select(edges.to_vec()), 1 => Just(Duration::MAX), 1 => any::<u64>().prop_map(Duration::from_nanos)]
 }
 
-proptest! {
+properties! {
     #![proptest_config(same_cases(20_000, 0x0065_6467))]
 
     /// Tick k is offset + t with t·(10⁹ + d) ≤ k·Tc·10⁹ < (t + 1)·(10⁹ + d), and `None` exactly if that is beyond the last instant.
@@ -86,7 +87,7 @@ impl Event for Numbered {
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(same_cases(500, 0x0071_7565))]
 
     /// Events around the end of time, and some at its beginning, come out as sorting says, whenever they are put in and taken.

@@ -4,6 +4,7 @@
 use std::time::Duration;
 
 use cohaptic_tests::same_cases;
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Ecn, Instant, Probability, Rate};
 use cohaptic_wan::{
     Bottleneck, Chance, CoDel, Correlation, Delay, DeliveryTrace, Discipline, Displacement, Distribution, DualPi2, Fate, FqCoDel, Framing,
@@ -157,24 +158,24 @@ fn instants() -> impl Strategy<Value = Vec<Instant>> {
 }
 
 /// Takes all events out of a link; each happens at or after it was offered.
-fn drained(link: &mut Link<u8>) -> usize {
+fn drained(link: &mut Link<u64>) -> usize {
     let events = std::iter::from_fn(|| link.poll_event());
     events.map(|event| assert!(event.at >= event.offered && event.fate.is_end() | (event.fate == Fate::Duplicated))).count()
 }
 
-fn is_conserved(link: &Link<u8>) -> bool {
+fn is_conserved(link: &Link<u64>) -> bool {
     let stats = link.stats();
     stats.offered() + stats.duplicated() == stats.delivered() + stats.dropped_in_all() + stats.in_flight()
 }
 
-proptest! {
+properties! {
     #![proptest_config(same_cases(3000, 0x6c69_6e6b))]
 
     /// Whatever the stages, in a link that changes to other ones near the end. When time is at its end, nothing is left inside but what a recorded line has no
     /// opportunity for any more.
     #[test]
     fn every_stage_holds_at_the_edges(one in config(), other in config(), instants in instants(), sizes in vec(size(), 25), change in 0..25_usize) {
-        let mut link: Link<u8> = Link::new(3, &LinkName::between("a", "b"), one.clone());
+        let mut link: Link<u64> = Link::new(3, &LinkName::between("a", "b"), one.clone());
         for (number, (now, size)) in instants.iter().zip(sizes).enumerate() {
             if number == change {
                 link.set_model(*now, other.clone()).unwrap();
@@ -213,8 +214,8 @@ proptest! {
             let mut fates = Vec::new();
             for (now, size) in instants.iter().zip(&sizes) {
                 let size = bounded(*size, &[&configs[0], &configs[1]]);
-                network.handle_broadcast(*now, NodeId(0), size, ()).unwrap();
-                network.handle_packet(*now, NodeId(1), NodeId(0), size, ()).unwrap();
+                network.handle_broadcast(*now, NodeId(0), size, 0_u64).unwrap();
+                network.handle_packet(*now, NodeId(1), NodeId(0), size, 0_u64).unwrap();
                 fates.extend(std::iter::from_fn(|| network.poll_event()));
             }
             network.handle_timeout(Instant::MAX).unwrap();
@@ -235,7 +236,7 @@ proptest! {
     ) {
         let words = netem::Netem::parse(words).unwrap();
         let model = LinkModel::from(KernelNetem::new(words, Vec::new()).unwrap());
-        let mut link: Link<u8> = Link::new(3, &LinkName::between("a", "b"), model);
+        let mut link: Link<u64> = Link::new(3, &LinkName::between("a", "b"), model);
         for (now, size) in instants.iter().zip(sizes) {
             link.handle_packet(*now, size, 0).unwrap();
             prop_assert!(is_conserved(&link));
@@ -251,14 +252,14 @@ proptest! {
 fn what_would_arrive_past_the_end_arrives_at_it() {
     let now = Instant::from_nanos(u64::MAX - 5);
     let names = LinkName::between("a", "b");
-    let mut link: Link<u8> = Link::new(0, &names, LinkConfig::default());
+    let mut link: Link<u64> = Link::new(0, &names, LinkConfig::default());
     for (payload, delay) in (0..).zip([nanos(4), Duration::MAX, nanos(5), nanos(6), nanos(u64::MAX)]) {
         link.set_model(now, LinkConfig { delay: Delay::constant(delay), ..LinkConfig::default() }).unwrap();
         link.handle_packet(now, Bytes::new(1), payload).unwrap();
     }
     assert_eq!(link.poll_timeout(), Some(Instant::from_nanos(u64::MAX - 1)));
     link.handle_timeout(Instant::MAX).unwrap();
-    let events: Vec<(u8, u64)> = std::iter::from_fn(|| link.poll_event()).map(|event| (event.payload, event.at.as_nanos())).collect();
+    let events: Vec<(u64, u64)> = std::iter::from_fn(|| link.poll_event()).map(|event| (event.payload, event.at.as_nanos())).collect();
     assert_eq!(events, [(0, u64::MAX - 1), (1, u64::MAX), (2, u64::MAX), (3, u64::MAX), (4, u64::MAX)]);
     assert_eq!(link.poll_timeout(), None);
 }
@@ -279,7 +280,7 @@ fn jitter_beyond_292_years_is_refused() {
 fn the_largest_packet_at_the_lowest_and_the_highest_rate() {
     let at_rate = |bits| LinkConfig { bottleneck: Some(Bottleneck::at_rate(Rate::bits_per_sec(bits).unwrap())), ..LinkConfig::default() };
     let largest = Bytes::new(u64::MAX);
-    let mut link: Link<u8> = Link::new(0, &LinkName::between("a", "b"), at_rate(u64::MAX));
+    let mut link: Link<u64> = Link::new(0, &LinkName::between("a", "b"), at_rate(u64::MAX));
     link.handle_packet(Instant::ZERO, largest, 0).unwrap();
     assert_eq!(link.poll_timeout(), Some(Instant::from_nanos(8_000_000_000)));
     // Half of it is sent; the other half takes for ever at one bit a second, and 4 s at the old rate.

@@ -7,8 +7,8 @@
 use cohaptic_harness::{Model, NoObserver, Simulation};
 use cohaptic_peer::{EXACT_FROM, Held, State};
 use cohaptic_tests::{Draft, same_cases};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
-use proptest::prelude::*;
 
 use crate::hard::ROUNDING;
 use crate::hard::exact_sum::ExactSum;
@@ -88,7 +88,7 @@ fn one_large_value_costs_one_of_four_sums() {
     within_the_bound(&values);
 }
 
-proptest! {
+properties! {
     #![proptest_config(same_cases(200, 0x6d65_616e))]
 
     /// Values of any size: 600 orders of magnitude, so far from both ends that no sum overflows and no mean underflows.

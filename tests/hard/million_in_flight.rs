@@ -161,7 +161,7 @@ fn a_million_packets_over_a_thousand_links_have_the_fates_of_single_links() {
         let mut fates = Vec::new();
         for number in 0..each {
             for from in 0..nodes {
-                network.handle_broadcast(sent(number), NodeId(from), SIZE, ()).unwrap();
+                network.handle_broadcast(sent(number), NodeId(from), SIZE, 0_u64).unwrap();
             }
             while let Some(event) = network.poll_event() {
                 fates.push((event.at, event.path.from.0, event.path.to.0, event.sequence, event.fate));
@@ -182,7 +182,7 @@ fn a_million_packets_over_a_thousand_links_have_the_fates_of_single_links() {
     for (from, to) in (0..nodes).flat_map(|from| (0..nodes).map(move |to| (from, to))).filter(|(from, to)| from != to) {
         let mut link = Link::new(7, &LinkName::between(&names[usize::from(from)], &names[usize::from(to)]), config.clone());
         for number in 0..each {
-            link.handle_packet(sent(number), SIZE, ()).unwrap();
+            link.handle_packet(sent(number), SIZE, 0_u64).unwrap();
         }
         link.handle_timeout(Instant::MAX).unwrap();
         while let Some(event) = link.poll_event() {

@@ -16,6 +16,11 @@ fn just_in_time(now: Instant) -> LinkConfig {
     LinkConfig { delay: Delay::constant(AT - now), ..LinkConfig::default() }
 }
 
+/// Payload of a packet by its sender, receiver and sequence number.
+fn payload((from, to, sequence): (u16, u16, u64)) -> u64 {
+    u64::from(from) << 48 | u64::from(to) << 32 | sequence
+}
+
 /// Sixty-four nodes send each other three packets each, at different times over links that change, so that all 12,096 arrive at one nanosecond. They come in the
 /// order of (sender, receiver, sequence), whichever path they took through the program and in whatever order they were sent.
 #[test]
@@ -31,15 +36,16 @@ fn twelve_thousand_packets_at_one_nanosecond_come_by_sender_receiver_and_number(
                 let (from, to) = pairs[turn * stride % pairs.len()];
                 let now = Instant::from_nanos(round * 100_000_000 + turn as u64);
                 network.set_link(now, NodeId(from), NodeId(to), just_in_time(now)).unwrap();
-                network.handle_packet(now, NodeId(from), NodeId(to), Bytes::new(64), (from, to, round)).unwrap();
+                network.handle_packet(now, NodeId(from), NodeId(to), Bytes::new(64), payload((from, to, round))).unwrap();
             }
         }
         assert_eq!((network.poll_timeout(), network.poll_event()), (Some(AT), None));
         network.handle_timeout(AT).unwrap();
         let came: Vec<(u16, u16, u64)> = std::iter::from_fn(|| network.poll_event())
             .map(|event| {
-                assert_eq!((event.fate, event.payload), (Fate::Delivered(AT), (event.path.from.0, event.path.to.0, event.sequence)));
-                event.payload
+                let packet = (event.path.from.0, event.path.to.0, event.sequence);
+                assert_eq!((event.fate, event.payload), (Fate::Delivered(AT), payload(packet)));
+                packet
             })
             .collect();
         let expected: Vec<(u16, u16, u64)> = pairs.iter().flat_map(|(from, to)| (0..3).map(move |round| (*from, *to, round))).collect();

@@ -5,6 +5,7 @@ use std::convert::Infallible;
 use cohaptic_harness::{Model, Observer, Simulation};
 use cohaptic_scene::Scene;
 use cohaptic_tests::{cases, shipped_scenes};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 
@@ -44,7 +45,7 @@ fn with_number(text: &str, index: prop::sample::Index, number: &str) -> String {
     format!("{}{number}{}", &text[..start], &text[end..])
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(2000))]
 
     #[test]

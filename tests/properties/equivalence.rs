@@ -6,9 +6,10 @@ use cohaptic_peer::{Coordination, Gains};
 use cohaptic_scene::Scene;
 use cohaptic_stability::{Method, analyse};
 use cohaptic_tests::{cases, drafts, first_difference, run};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
-proptest! {
+properties! {
     #![proptest_config(cases(300))]
 
     #[test]

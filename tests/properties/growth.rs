@@ -7,6 +7,7 @@ use cohaptic_harness::Model;
 use cohaptic_peer::Contact;
 use cohaptic_stability::{Method, Monodromy, StateKind, analyse, monodromy};
 use cohaptic_tests::{Draft, DraftHand, DraftLink, Log, Tick, cases, drafts, run};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 use proptest::sample::select;
 
@@ -46,7 +47,7 @@ fn linear() -> impl Strategy<Value = Draft> {
     })
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(60))]
 
     /// The component along the eigenvector of the largest eigenvalue grows by that eigenvalue a frame, over 200 frames (fewer where it would sink into

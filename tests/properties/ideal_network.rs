@@ -4,11 +4,12 @@
 use cohaptic_harness::Model;
 use cohaptic_peer::Coordination;
 use cohaptic_tests::{Draft, Log, cases, drafts, run};
+use cohaptic_tests_common::properties;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
 
-proptest! {
+properties! {
     #![proptest_config(cases(100))]
 
     /// At every tick the coordination forces sum to zero: Σᵢ (xᵢ − x̄ᵢ) = 0, where x̄ᵢ is the mean of the others.

@@ -10,6 +10,7 @@ use cohaptic_peer::{Contact, Coordination, Gains};
 use cohaptic_scene::{Measure, MeasureName, MeasureSettings, MeasureSpec, Scene};
 use cohaptic_stability::{Method, admittance, analyse};
 use cohaptic_tests::{Draft, DraftHand, cases, drafts};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 use proptest::sample::select;
 
@@ -23,7 +24,7 @@ fn probed(draft: &Draft) -> Scene {
     scene
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(60))]
 
     #[test]

@@ -6,6 +6,7 @@ use cohaptic_peer::coordination::LawValue;
 use cohaptic_stability::{Method, analyse};
 use cohaptic_tests::drafts::anything;
 use cohaptic_tests::{Draft, cases, run};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 /// The scene with `local-damping`, and the one with the same damping in its object.
@@ -19,7 +20,7 @@ fn both(draft: Draft, damping: f64) -> (Draft, Draft) {
     (local, object)
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(60))]
 
     #[test]

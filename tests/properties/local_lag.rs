@@ -8,6 +8,7 @@ use cohaptic_peer::coordination::LawValue;
 use cohaptic_stability::{Method, analyse};
 use cohaptic_tests::drafts::anything;
 use cohaptic_tests::{Draft, cases, run};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 fn both(draft: Draft) -> (Draft, Draft) {
@@ -17,7 +18,7 @@ fn both(draft: Draft) -> (Draft, Draft) {
     (lagging, plain)
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(60))]
 
     #[test]

@@ -8,6 +8,7 @@ use cohaptic_peer::State;
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_scene::{Measure, MeasureName, MeasureSettings, MeasureSpec, MeasureTravel, Scene};
 use cohaptic_tests::{Body, Log, Place, Tick, cases, drafts, run};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use cohaptic_wan::Fate;
 use proptest::prelude::*;
@@ -178,7 +179,7 @@ fn of((peer, axis, distance, band): &(Index, Index, f64, f64), scene: &Scene) ->
     MeasureSettings { travel, band: *band, probe: None }
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(150))]
 
     #[test]

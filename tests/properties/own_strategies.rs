@@ -4,6 +4,7 @@ use cohaptic_harness::{Model, Simulation, Strategies};
 use cohaptic_peer::{Command, Context, Coordination, Gains, State, Strategy};
 use cohaptic_scene::Scene;
 use cohaptic_tests::{cases, drafts, first_difference, keep, run};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 /// Average-position coordination written again, from the samples one by one.
@@ -37,14 +38,15 @@ impl<const A: usize> Strategy<A> for Mine {
 struct AllMine(Gains);
 
 impl Strategies for AllMine {
-    type Strategy<const A: usize> = Mine;
+    // The loops of a run are compiled for each type of strategies. `claims::passivity_control` has boxed strategies too.
+    type Strategy<const A: usize> = Box<dyn Strategy<A>>;
 
-    fn strategy<const A: usize>(&self, _scene: &Scene, _peer: usize) -> Mine {
-        Mine(self.0)
+    fn strategy<const A: usize>(&self, _scene: &Scene, _peer: usize) -> Self::Strategy<A> {
+        Box::new(Mine(self.0))
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(100))]
 
     /// With one or two others there is one way to add samples up, so the two agree to the bit.

@@ -9,6 +9,7 @@ use cohaptic_peer::{Coordination, SendWhen};
 use cohaptic_scene::{Change, ChangeKind, Scene};
 use cohaptic_tests::drafts::{fixed_link, well_behaved};
 use cohaptic_tests::{cases, run};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 use proptest::sample::select;
@@ -41,7 +42,7 @@ fn change(at: Duration, settings: LawSettings) -> Change {
     Change { at: Instant::ZERO.saturating_add(at), what: ChangeKind::Parameters(Box::new(settings)) }
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(40))]
 
     #[test]

@@ -8,6 +8,7 @@ use cohaptic_harness::{Model, Observer, Simulation, TickRow};
 use cohaptic_peer::rotation::Attitude;
 use cohaptic_scene::Scene;
 use cohaptic_tests::cases;
+use cohaptic_tests_common::properties;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
@@ -165,7 +166,7 @@ fn apart(one: Triple, other: Triple) -> f64 {
 /// more than a thousand times.
 const ROUNDINGS: f64 = 1e-10;
 
-proptest! {
+properties! {
     #![proptest_config(cases(60))]
 
     #[test]

@@ -12,6 +12,7 @@ use cohaptic_harness::{Model, Observer, Simulation, TickRow};
 use cohaptic_peer::rotation::Attitude;
 use cohaptic_scene::Scene;
 use cohaptic_tests::cases;
+use cohaptic_tests_common::properties;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
@@ -197,7 +198,7 @@ fn turns(turning: bool) -> impl Strategy<Value = Turned> {
         .prop_map(|(mass, inertia, stiffness, coupling, turning, peers)| Turned { mass, inertia, stiffness, coupling, turning, peers })
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(60))]
 
     /// No delay, a sample a tick, nothing tied to ground, and dampers of turns alone, whose torques are opposite: momentum is rounded. At the beginning of a tick the torques

@@ -3,9 +3,10 @@
 use cohaptic_harness::Model;
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_tests::{Draft, Log, Tick, cases, drafts, run};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
-proptest! {
+properties! {
     #![proptest_config(cases(200))]
 
     /// A power of two as the shift, so that shifting itself rounds each initial position once and no more.

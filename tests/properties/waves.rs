@@ -6,6 +6,7 @@ use cohaptic_peer::coordination::LawValue;
 use cohaptic_peer::{Contact, Coordination};
 use cohaptic_stability::{Monodromy, StateKind, monodromy};
 use cohaptic_tests::{Draft, DraftHand, DraftLink, Log, cases, drafts, run};
+use cohaptic_tests_common::properties;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -81,7 +82,7 @@ fn bodies(monodromy: &Monodromy, draft: &Draft, log: &Log, frame: usize) -> Vec<
     monodromy.states.iter().map(|state| value(state.peer, state.kind)).collect()
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(30))]
 
     #[test]

@@ -154,11 +154,12 @@ fn ranges(numbers: &[u64]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
 
-    proptest! {
+    properties! {
         #[test]
         fn every_piece_is_in_one_shard(count in 1_u64..40, piece: u64) {
             let having = (1..=count).filter(|index| Shard::new(*index, count).unwrap().has(piece)).count();

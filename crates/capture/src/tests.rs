@@ -1,3 +1,4 @@
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::DropCause;
 use pcap_parser::traits::PcapNGPacketBlock;
@@ -142,7 +143,7 @@ fn a_name_of_any_length_fits() {
     assert_eq!(PcapNGSlice::from_slice(&file).unwrap().count(), 2);
 }
 
-proptest! {
+properties! {
     #[test]
     fn headers_and_checksums_are_right(sequence in 0..1_000_000_u64, later in any::<u32>(), payload in prop::collection::vec(any::<u8>(), 0..200), marked: bool) {
         let row = PacketRecord { marked, ..delivered(sequence, sequence * 1_000 + u64::from(later), payload.len() as u64) };

@@ -61,6 +61,7 @@ fn converted(value: &Json) -> Result<Toml, String> {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
     use serde_json::json;
 
@@ -125,7 +126,7 @@ mod tests {
         })
     }
 
-    proptest! {
+    properties! {
         #[test]
         fn any_value_is_toml_and_reads_back_from_what_is_shown(value in values()) {
             let toml = from_json(&value).unwrap();

@@ -1,5 +1,6 @@
 use core::time::Duration;
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -186,7 +187,7 @@ fn moments() -> impl Strategy<Value = ([f64; 3], Moment, u64, bool)> {
     )
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Every promise of the gate, stated independently, for any sequence of forces.

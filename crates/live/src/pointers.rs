@@ -189,6 +189,7 @@ impl Device for PointerDevice {
 #[cfg(test)]
 mod tests {
     use cohaptic_device::{Gate, Limits, Moment};
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
@@ -274,7 +275,7 @@ mod tests {
         near(x(&mut *pointer.device(), 0), [0.03, 0.0]);
     }
 
-    proptest! {
+    properties! {
         #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
 
         /// For any positions told at any times, the read position is finite, and no farther from the origin than the farthest accepted position.

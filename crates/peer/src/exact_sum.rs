@@ -189,6 +189,7 @@ fn nearest(quotient: u128, digit: usize, is_more: bool) -> f64 {
 mod tests {
     use alloc::vec::Vec;
 
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
@@ -207,7 +208,7 @@ mod tests {
         ((whole as i128) << 45) + ((scaled - whole) * 2_f64.powi(45)) as i128
     }
 
-    proptest! {
+    properties! {
         /// No other number is nearer to the exact mean. The inputs are multiples of 2^−30 below 2^30, whose sum and mean are whole in units of 2^−90.
         #[test]
         fn a_mean_is_the_nearest_number(numbers in prop::collection::vec(-(1_i64 << 60)..1 << 60, 1..50), cuts in 0..60_u32) {
@@ -257,7 +258,7 @@ mod tests {
         }
     }
 
-    proptest! {
+    properties! {
         /// Pairs of close numbers, whose differences are mostly exact, and pairs of distant numbers, whose differences never are.
         #[test]
         fn a_number_takes_the_place_of_another(pairs in prop::collection::vec((-1e3..1e3_f64, -1.0..1.0_f64, -60..4_i32), 1..40)) {

@@ -86,12 +86,13 @@ impl<const A: usize> Lead<A> {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_tests_common::properties;
     use proptest::collection::vec;
     use proptest::prelude::*;
 
     use super::*;
 
-    proptest! {
+    properties! {
         /// The lead, followed over ticks, is the mean of min(age, horizon)·velocity, summed sample by sample. Each side rounds every product and every sum:
         /// fewer than 40 roundings of numbers of at most 2 m/s times a quarter of a second.
         #[test]

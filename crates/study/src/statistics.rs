@@ -145,6 +145,7 @@ const fn float(count: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
@@ -211,7 +212,7 @@ mod tests {
         assert!((one - 0.038_477).abs() < 5.0 * 2e-4, "{one}");
     }
 
-    proptest! {
+    properties! {
         /// The signs and the order of the units do not matter, and a unit without a difference halves nothing.
         #[test]
         fn p_is_that_of_the_differences_as_a_set(differences in prop::collection::vec(-4_i32..=4, 1..9)) {

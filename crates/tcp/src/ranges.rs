@@ -78,11 +78,12 @@ impl Ranges {
 mod tests {
     use alloc::vec::Vec;
 
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
 
-    proptest! {
+    properties! {
         #[test]
         fn a_set_of_ranges_is_a_set(inserts in prop::collection::vec((0u64..60, 0u64..12), 0..20), cut in 0u64..70) {
             let mut ranges = Ranges::default();

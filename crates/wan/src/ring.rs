@@ -158,11 +158,12 @@ impl<T> Ring<T> {
 mod tests {
     use alloc::collections::VecDeque;
 
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
 
-    proptest! {
+    properties! {
         /// A number below 6 is a value to push; each of the other numbers stands for another operation.
         #[test]
         fn it_does_what_a_deque_does(acts in prop::collection::vec(0_u8..10, 0..200)) {

@@ -1,3 +1,5 @@
+use cohaptic_tests_common::properties;
+
 use super::*;
 
 fn texts(text: &str) -> Vec<String> {
@@ -119,7 +121,7 @@ fn keys_are_the_same_however_they_are_quoted() {
     assert!(vary.is_key("scene.seed") && !vary.is_key("scene.count"));
 }
 
-proptest::proptest! {
+properties! {
     /// Every text is read or refused, and the value in the table equals the value in the scene.
     #[test]
     fn no_text_breaks_it(text in "\\PC{0,30}", range in "[a.]{1,3}=[-0-9.e]{1,6}\\.\\.[-0-9.e]{1,6}(ms)?/[0-9]{1,3}(:log)?") {

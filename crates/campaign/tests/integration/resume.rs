@@ -1,11 +1,12 @@
 //! Campaigns stopped anywhere and continued give the same bytes.
 
 use cohaptic_campaign::{Format, Outcome};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use crate::bench::{Bench, StopAfter, VARY};
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
     /// The campaign is stopped again and again, with any number of threads, and parts are torn off or half written as by a kill. The table equals the table of

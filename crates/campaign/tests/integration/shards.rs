@@ -4,6 +4,7 @@ use std::fs;
 
 use cohaptic_campaign::{CampaignError, FolderState, Format, Judge, Judgement, NoWatch, Outcome, Shard, SharedCampaign, Verdict, worker_log};
 use cohaptic_scene::Scene;
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use crate::bench::{Bench, StopAfter, VARY};
@@ -30,7 +31,7 @@ fn turns() -> impl Strategy<Value = Vec<Turn>> {
     prop::collection::vec(turn, 0..12)
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]

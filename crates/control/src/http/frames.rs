@@ -134,6 +134,7 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Counted<S> {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
@@ -169,7 +170,7 @@ mod tests {
         frame
     }
 
-    proptest! {
+    properties! {
         /// Each frame counts once, at its first byte, however the bytes are cut.
         #[test]
         fn frames_are_counted_whatever_their_bytes_are_cut_into(

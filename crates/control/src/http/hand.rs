@@ -270,6 +270,7 @@ async fn send(out: &mut (impl Sink<Message> + Unpin), message: Message) -> bool 
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
@@ -283,7 +284,7 @@ mod tests {
         }
     }
 
-    proptest! {
+    properties! {
         #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
         /// Any text is refused or gives finite numbers, and no text panics.

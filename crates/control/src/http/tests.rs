@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex};
 use axum::Router;
 use axum::body::{Body, to_bytes};
 use axum::http::{HeaderMap, Request, StatusCode};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 use tokio::runtime::{Builder, Runtime};
@@ -379,7 +380,7 @@ fn large_bodies_are_413() {
     assert!(answer.error().contains("65536"));
 }
 
-proptest! {
+properties! {
     #[test]
     fn whatever_is_asked_is_answered(method in "[A-Z]{1,7}", path in "/[ -~]{0,40}", body in prop::collection::vec(any::<u8>(), 0..200)) {
         prop_assume!(!path.starts_with("/api/events"));

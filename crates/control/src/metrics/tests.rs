@@ -2,6 +2,7 @@ use core::time::Duration;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use super::text;
@@ -223,7 +224,7 @@ fn strange_names_are_escaped() {
     assert!(families["cohaptic_peer_age_seconds"].samples.contains_key(&key));
 }
 
-proptest! {
+properties! {
     #[test]
     fn any_name_reads_back(name in any::<String>()) {
         let (description, latest) = example(&name);

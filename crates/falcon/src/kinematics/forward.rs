@@ -99,6 +99,7 @@ fn along_the_way(angles: Triple) -> Option<Triple> {
 mod tests {
     use super::*;
     use crate::kinematics::{angle_of_count, count_of_angle, is_usable};
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     fn distance(a: Triple, b: Triple) -> f64 {
@@ -161,7 +162,7 @@ mod tests {
         }
     }
 
-    proptest! {
+    properties! {
         #![proptest_config(ProptestConfig { cases: 3000, max_global_rejects: 30_000, failure_persistence: None, ..ProptestConfig::default() })]
 
         #[test]

@@ -51,6 +51,7 @@ impl Jacobian {
 mod tests {
     use super::*;
     use crate::kinematics::inverse;
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     #[test]
@@ -100,7 +101,7 @@ mod tests {
         }
     }
 
-    proptest! {
+    properties! {
         #![proptest_config(ProptestConfig { cases: 1000, failure_persistence: None, ..ProptestConfig::default() })]
 
         #[test]

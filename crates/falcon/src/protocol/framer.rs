@@ -109,6 +109,7 @@ fn fits<F: Frame>(at: usize, byte: u8) -> bool {
 mod tests {
     use super::*;
     use crate::protocol::Buttons;
+    use cohaptic_tests_common::properties;
     use proptest::collection::vec;
     use proptest::prelude::*;
 
@@ -151,7 +152,7 @@ mod tests {
         }
     }
 
-    proptest! {
+    properties! {
         #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
         #[test]

@@ -1,5 +1,6 @@
 use core::time::Duration;
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -98,7 +99,7 @@ fn causes_have_the_words_of_a_falcon() {
     assert_eq!(ZeroCause::ALL.map(ZeroCause::name), names);
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// No count exceeds the limit of a motor, and a force that is zero has no counts, at any place and for any sequence of forces.

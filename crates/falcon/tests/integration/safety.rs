@@ -6,6 +6,7 @@ use cohaptic_falcon::driver::{DriverConfig, Phase, Setpoint};
 use cohaptic_falcon::protocol::Leds;
 use cohaptic_falcon::safety::{Limits, ZeroCause};
 use cohaptic_falcon::simulator::{Faults, SimulatorConfig, StillHand, Waypoints};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use core::time::Duration;
 use proptest::prelude::*;
@@ -139,7 +140,7 @@ fn without_arming_forces_come_with_homing() {
     assert_eq!(bench.unhomed_count(), 0);
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// No motor moves before homing, for any wanted force and on a very bad connection.

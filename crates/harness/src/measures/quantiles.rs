@@ -76,6 +76,7 @@ impl QuantileSketch {
 #[cfg(test)]
 #[allow(clippy::float_cmp, reason = "values that must come out exactly")]
 mod tests {
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
@@ -99,7 +100,7 @@ mod tests {
         proptest::collection::vec(value, 1..300)
     }
 
-    proptest! {
+    properties! {
         #[test]
         fn a_quantile_is_the_value_of_its_rank_within_a_256th(mut values in values(), percent in 0..=100_u64) {
             let found = sketch(&values).quantile(percent).unwrap();

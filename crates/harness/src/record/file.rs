@@ -107,6 +107,7 @@ pub(crate) fn push_display(line: &mut Vec<u8>, value: impl std::fmt::Display) {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_tests_common::properties;
     use cohaptic_units::print::Seconds;
     use proptest::prelude::*;
 
@@ -118,7 +119,7 @@ mod tests {
         String::from_utf8(line).unwrap()
     }
 
-    proptest! {
+    properties! {
         #[test]
         fn instants_are_written_as_they_print(nanos in prop_oneof![any::<u64>(), 0..2_000_000_001_u64], power in 0..10_u32) {
             for at in [nanos, nanos / 10_u64.pow(power) * 10_u64.pow(power)].map(Instant::from_nanos) {

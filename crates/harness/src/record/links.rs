@@ -110,11 +110,12 @@ fn push_delay(row: &mut Vec<u8>, delay: Duration) {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
 
-    proptest! {
+    properties! {
         #[test]
         fn delays_are_written_as_their_seconds_print(nanos in prop_oneof![0..2_000_000_000_u64, any::<u64>()], power in 0..9_u32) {
             for delay in [nanos, nanos / 10_u64.pow(power) * 10_u64.pow(power)].map(Duration::from_nanos) {

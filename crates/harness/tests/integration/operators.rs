@@ -8,6 +8,7 @@ use cohaptic_harness::measures::Measures;
 use cohaptic_harness::record::Recorder;
 use cohaptic_harness::{Model, NoObserver, Observer, Simulation, TickRow};
 use cohaptic_scene::{Scene, TaskOutcome};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 
@@ -92,7 +93,7 @@ fn recorded(scene: &Scene, model: Model) -> Vec<(String, Vec<u8>)> {
     files.iter().map(|file| (file.file_name().unwrap().to_str().unwrap().to_owned(), std::fs::read(file).unwrap())).collect()
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(16))]
 
     /// A loop in which all peers tick together, a loop with an event for each tick, and a run that nobody watches move operators alike, to the bit.

@@ -2,6 +2,7 @@
 
 use cohaptic_device::{Description, Device, GatedForce, Reading, Stopper};
 use cohaptic_harness::live::{LiveScene, Transmit};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::option;
@@ -135,7 +136,7 @@ fn written_out(summary: &cohaptic_harness::Summary) -> String {
     format!("{summary:?}")
 }
 
-proptest! {
+properties! {
     #![proptest_config(crate::cases(120))]
 
     /// Scenes with jitter, loss, queues, damage, changes of links in the timeline and by hand, rejoining, busy drivers, and devices that come and go.

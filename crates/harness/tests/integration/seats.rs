@@ -6,6 +6,7 @@ use cohaptic_harness::live::{Inputs, InputsError, LiveScene, Presence, SampleErr
 use cohaptic_harness::{Ending, NoObserver, Observer, PacketRow};
 use cohaptic_peer::ReceiveError;
 use cohaptic_peer::wire::{DecodeError, Sample};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use cohaptic_wan::{Fate, NodeId};
 use proptest::prelude::*;
@@ -288,7 +289,7 @@ fn a_record_that_is_cut_anywhere_is_not_whole() {
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(crate::cases(300))]
 
     #[test]

@@ -5,6 +5,7 @@ use std::convert::Infallible;
 use cohaptic_harness::live::LiveScene;
 use cohaptic_harness::{Observer, TickRow};
 use cohaptic_scene::Scene;
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -106,7 +107,7 @@ fn the_bound_would_see_a_jump() {
     assert!(excess > 50.0, "{excess} N");
 }
 
-proptest! {
+properties! {
     #![proptest_config(crate::cases(60))]
 
     /// The other peer comes and goes at random times and places, over several networks. It stays at one place during each visit.

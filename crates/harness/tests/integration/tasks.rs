@@ -9,6 +9,7 @@ use cohaptic_harness::measures::{MeasuredRun, Measures};
 use cohaptic_harness::record::Recorder;
 use cohaptic_harness::{Ending, Model, NoObserver, Simulation, run_side_by_side};
 use cohaptic_scene::{Scene, TaskOutcome};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 
@@ -172,7 +173,7 @@ fn reached(states: &[(f64, usize, f64, f64)], targets: &[f64], radius: f64, spee
     reached
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(24))]
 
     /// The judge says what the definition says of the recorded trajectory, over random targets and networks.

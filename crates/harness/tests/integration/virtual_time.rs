@@ -8,6 +8,7 @@ use cohaptic_harness::live::LiveScene;
 use cohaptic_harness::{Observer, TickRow};
 use cohaptic_peer::rotation::Attitude;
 use cohaptic_scene::{PeerKind, Scene, scene_files};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -55,7 +56,7 @@ fn steps() -> impl Strategy<Value = Vec<u64>> {
     })
 }
 
-proptest! {
+properties! {
     #![proptest_config(crate::cases(60))]
 
     #[test]

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use cohaptic_linkfile::{FileError, RelayFile, RelayLimits, relay_link_keys_of_text};
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant};
-use proptest::prelude::*;
 
 const WHOLE: &str = r#"
 [relay]
@@ -138,7 +138,7 @@ fn remote_addresses_are_taken_where_they_are_allowed() {
     assert_eq!(parse(&text).unwrap().programs[0].port, "192.0.2.1:7001".parse().unwrap());
 }
 
-proptest! {
+properties! {
     /// The parser panics neither at arbitrary text nor at a relay file with a piece cut out or put in.
     #[test]
     fn no_text_makes_it_panic(noise in "\\PC{0,60}", at in 0_usize..WHOLE.len(), cut in 0_usize..40) {

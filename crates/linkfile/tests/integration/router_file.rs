@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use cohaptic_linkfile::FileError;
 use cohaptic_linkfile::router::{Attachment, InterfaceSpec, Memory, Network, Ports, Protocol, RouterFile, RuleSpec, Side, Target, TunSpec};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Bytes;
 use cohaptic_wan::{Delay, LinkConfig};
 use proptest::prelude::*;
@@ -195,7 +196,7 @@ fn a_file_is_read_and_one_that_is_not_there_is_named() {
     assert!(error.is_io() && error.to_string().starts_with("no/such/router.toml: cannot be read: "));
 }
 
-proptest! {
+properties! {
     /// A file with a piece cut out or put in is a router, or is refused with an error that can be shown.
     #[test]
     fn no_text_causes_a_panic(at in 0..EVERY_KEY.len(), length in 0_usize..60, splice in prop::sample::select(vec![

@@ -215,6 +215,7 @@ impl Window {
 mod tests {
     use std::collections::BTreeSet;
 
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
@@ -229,7 +230,7 @@ mod tests {
         assert!(!window.accept(128));
     }
 
-    proptest! {
+    properties! {
         #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
 
         /// Compares the window with a set of all numbers ever seen, with jumps within the window and beyond the window.

@@ -3,6 +3,7 @@
 use cohaptic_live::client::{Client, ClientConfig, Heard, SessionInfo};
 use cohaptic_live::{Admission, AdmissionControl, MAX_DATAGRAM, SystemEntropy};
 use cohaptic_peer::wire;
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 use std::time::Duration;
@@ -110,7 +111,7 @@ fn play(with_key: bool, ways: &[(Way, Way)]) -> ([Vec<u64>; 2], [Vec<u64>; 2]) {
     (admitted, heard)
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(48))]
 
     /// Each half has 2.4 s of a bad network, which loses three of ten ticks and delays two of ten, and then 1.28 s of a network that loses nothing. Between

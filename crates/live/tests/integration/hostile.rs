@@ -3,6 +3,7 @@
 use cohaptic_live::client::{Client, ClientConfig, Heard, Joined};
 use cohaptic_live::handshake::Taken;
 use cohaptic_live::{Admission, AdmissionControl, MAX_DATAGRAM, Place, Refusal};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use crate::support::{
@@ -98,7 +99,7 @@ fn datagram() -> impl Strategy<Value = Vec<u8>> {
     prop_oneof![noise, changed]
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(300))]
 
     /// Sends 100 datagrams in each of 300 cases. Two changes of the same byte can cancel out. The datagram is then good, and is skipped, because a stranger

@@ -74,6 +74,7 @@ impl OrderOfArrival {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
@@ -103,7 +104,7 @@ mod tests {
         assert_eq!(figures(&[]).reordered, None);
     }
 
-    proptest! {
+    properties! {
         #[test]
         fn extents_are_those_of_the_definition(numbers in prop::collection::btree_set(0..200_u64, 0..60), swaps in prop::collection::vec((any::<prop::sample::Index>(), any::<prop::sample::Index>()), 0..40)) {
             let mut arrivals: Vec<u64> = numbers.into_iter().collect();

@@ -1,3 +1,4 @@
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{DropCause, Fate};
 use proptest::prelude::*;
@@ -167,7 +168,7 @@ fn figures_of_a_known_law_lie_within_their_own_standard_errors() {
     assert!((loss.gap_mean.unwrap() - 5.0).abs() < 4.0 * loss.gap_mean_se.unwrap());
 }
 
-proptest! {
+properties! {
     #[test]
     fn fates_are_conserved_and_runs_add_up(fates in prop::collection::vec((0..4_u8, 0..50_u64), 0..200)) {
         let mut records = Vec::new();

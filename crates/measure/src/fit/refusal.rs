@@ -1,5 +1,6 @@
 //! Tests with delays that follow no law.
 
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 use rand_distr::{Distribution as _, Exp1, StandardNormal};
 
@@ -139,7 +140,7 @@ fn lists() -> impl Strategy<Value = Vec<f64>> {
     })
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     /// For any list of delays and any resolution of the clock, the mean and the deviation of the link lie within the standard errors of the sample, or the

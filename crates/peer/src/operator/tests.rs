@@ -3,6 +3,7 @@
 use std::f64::consts::{LN_2, PI};
 use std::time::Duration;
 
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use super::{MovesConfig, Operator, OperatorConfig, OperatorLaw, Seen, View};
@@ -174,7 +175,7 @@ fn follow(operator: &mut Operator<1>, delay: usize, ticks: usize, target: impl F
     wanted
 }
 
-proptest! {
+properties! {
     /// A person who waits for the delay pays the delay with each correction, but not with the first movement: N·T + (N − 1)·(τ + D) (as Ferrell 1965).
     #[test]
     fn each_correction_costs_the_delay(count in 1_u64..6, duration in 2_u64..40, visual in 0_u64..40, delay in 0_u64..60, reaction in 0_u64..50) {

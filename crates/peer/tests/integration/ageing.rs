@@ -7,6 +7,7 @@ use cohaptic_peer::{
     Age, Ages, Clock, Contact, Coordination, CopyConfig, Exchange, Forces, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, RestingDevice,
     State, coordination::LawStrategy,
 };
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -131,7 +132,7 @@ fn event() -> impl Strategy<Value = Event> {
     ]
 }
 
-proptest! {
+properties! {
     #![proptest_config(crate::cases(400))]
 
     /// The bound of the manual at every tick, for one of N − 1 senders that leaves, returns and jumps at random. `step` is h/fade.

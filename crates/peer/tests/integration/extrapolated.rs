@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use cohaptic_peer::coordination::{LawParameters, LawStrategy, LawValue, LawValues, Prediction};
 use cohaptic_peer::{Context, Coordination, Gains, Held, State, Strategy as _};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -35,7 +36,7 @@ fn force(gains: Gains, horizon: Duration, own: Body, others: &[(Body, u64)]) -> 
     strategy.command(&Context { now: Instant::ZERO, local_time, own: &own, held: &held, ahead: Prediction::REST }).force[0]
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(500))]
 
     /// The equation is FT = mean of KT·(x − xⱼ − min(age, horizon)·vⱼ) + BT·(v − vⱼ).

@@ -10,6 +10,7 @@ use cohaptic_peer::{
     Age, Ages, Clock, Contact, Coordination, CopyConfig, Device, DeviceConfig, Exchange, Gains, Hand, Held, Integrator, ObjectCopy, Peer, PeerConfig,
     Reception, RestingDevice, Signal, SimulatedDevice, State,
 };
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -81,7 +82,7 @@ fn datagram(client: usize, sequence: u64) -> ([u8; MAX_LEN], usize) {
     (bytes, len)
 }
 
-proptest! {
+properties! {
     #![proptest_config(crate::cases(500))]
 
     /// Arrivals at random are loss, repetition and reordering at once. The model knows which numbers have arrived, and nothing of windows.

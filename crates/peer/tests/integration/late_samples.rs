@@ -7,6 +7,7 @@ use cohaptic_peer::{
     Clock, Contact, Coordination, CopyConfig, Exchange, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, ReceiveError, Reception,
     RestingDevice, State, coordination::LawStrategy, wire::Sample,
 };
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -49,7 +50,7 @@ fn datagram(session: u64, sender: u32, sequence: u64) -> Vec<u8> {
     bytes[..len].to_vec()
 }
 
-proptest! {
+properties! {
     #![proptest_config(crate::cases(500))]
 
     #[test]

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use cohaptic_peer::coordination::{LawParameters, LawValues, Prediction, UsedGains};
 use cohaptic_peer::{Context, Coordination, Gains, Held, State, Strategy as _};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -48,7 +49,7 @@ pub(crate) fn gains() -> impl Strategy<Value = Gains> {
     (0.0..5000.0, 0.0..50.0).prop_map(|(stiffness, damping)| Gains { stiffness, damping })
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(500))]
 
     /// Rakhsha & Constantinescu 2015, eq. (2): the sum of the pulls of all other copies.

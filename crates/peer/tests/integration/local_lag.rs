@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use cohaptic_peer::coordination::{Law, LawParameters, LawStrategy, LawValue, LawValues, Prediction};
 use cohaptic_peer::{Context, Coordination, Gains, Held, State, Strategy as _};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -27,7 +28,7 @@ fn force(strategy: &mut LawStrategy<1>, own: Body, others: &[Body]) -> f64 {
     strategy.command(&Context { now: Instant::ZERO, local_time: Instant::ZERO, own: &own, held: &held, ahead: Prediction::REST }).force[0]
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(300))]
 
     /// The equation is FT(k) = mean of KT·(x(k − L) − xⱼ) + BT·(v(k − L) − vⱼ), with the first state before the first tick.

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use cohaptic_peer::rotation::{Attitude, HeldAttitudes, RotationStep, Spin, Triple, aligning_torque, turning_torque};
 use cohaptic_peer::{Gains, Integrator};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use crate::cases;
@@ -234,7 +235,7 @@ pub(crate) fn pairs(scale: f64) -> impl Strategy<Value = Triple> {
     [0.1..1.0, 0.1..1.0, 0.1..1.0].prop_map(move |[a, b, c]| [b + c, c + a, a + b].map(|sum| scale * sum))
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(200))]
 
     /// The potential is the mean of tr P(I − RᵢᵀRⱼ) over the other copies, differentiated by rotations of the copy about its axes.

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use cohaptic_peer::coordination::{LawParameters, LawStrategy, LawValue, LawValues, Prediction};
 use cohaptic_peer::{Context, Coordination, Gains, Held, State, Strategy as _};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 
@@ -23,7 +24,7 @@ fn forces(strategy: &mut LawStrategy<1>, own: Body, other: Body, ticks: usize) -
     (0..ticks).map(|_| strategy.command(&context).force[0]).collect()
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(500))]
 
     /// Under a constant pull F the force is F·(1 − e^(−k·Tc/lag)) at the k-th tick. Each tick rounds by some units in the last place of F. The accumulated

@@ -4,9 +4,10 @@
 use std::time::Duration;
 
 use cohaptic_peer::{Integrator, Motion, Plant};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
-proptest! {
+properties! {
     #![proptest_config(crate::cases(400))]
 
     /// Masses, springs, dampers and steps cover 12 decades each. Only two dimensionless numbers matter: the damping z = b·h/m and the squared angle w =
@@ -36,7 +37,7 @@ proptest! {
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(crate::cases(200))]
 
     /// One step of each method equals its textbook form, and not merely some form of its order: velocity first and the position with the new velocity; four

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use cohaptic_peer::rotation::{Attitude, HeldAttitudes, RotationStep, Spin, Triple, aligning_torque};
 use cohaptic_peer::{Gains, Integrator};
+use cohaptic_tests_common::properties;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -145,7 +146,7 @@ fn copy() -> impl Strategy<Value = (Triple, Attitude)> {
         .prop_map(|(inertia, sigma, rate)| (inertia, Attitude { rate, ..turned(sigma) }))
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(300))]
 
     /// Ages are drawn anew up to m ticks, as delay, jitter, loss and reordering would make them.

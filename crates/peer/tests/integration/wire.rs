@@ -3,13 +3,14 @@
 use cohaptic_peer::State;
 use cohaptic_peer::rotation::Attitude;
 use cohaptic_peer::wire::{DecodeError, Extra, MAX_LEN, Sample, SampleKind};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::num::f64::{INFINITE, NEGATIVE, NORMAL, POSITIVE, QUIET_NAN, SUBNORMAL, ZERO};
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
 
-proptest! {
+properties! {
     #![proptest_config(crate::cases(4000))]
 
     #[test]

@@ -2,6 +2,7 @@
 
 use cohaptic_picture::testing::faults;
 use cohaptic_picture::{Axis, Band, Fill, HeatMap, LegendPlace, Line, Look, Marker, Panel, Picture, Region, Rug, Size};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -72,7 +73,7 @@ fn picture() -> impl Strategy<Value = Picture> {
     )
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, rng_seed: RngSeed::Fixed(15), ..ProptestConfig::default() })]
 
     #[test]

@@ -2,6 +2,7 @@
 
 use cohaptic_stability::Matrix;
 use cohaptic_stability::numerics::real;
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use super::guarantee::Proven;
@@ -45,7 +46,7 @@ fn matrix(size: usize) -> impl Strategy<Value = Matrix> {
     proptest::collection::vec(-1.0..1.0_f64, size * size).prop_map(move |entries| Matrix::from_fn(size, size, |i, j| entries[i * size + j]))
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Products over a box enclose the products of its matrices, wherever in the box.

@@ -1,6 +1,7 @@
 //! Tests against known joint spectral radii, and of every bound against every cycle.
 
 use cohaptic_stability::Matrix;
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use super::automaton::Automaton;
@@ -192,7 +193,7 @@ fn longest_cycles(automaton: &Automaton, longest: usize) -> f64 {
     best
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     /// No cycle of up to ten steps grows faster than the upper bound or the certificate allows, and the cycle that is said to attain the lower bound is

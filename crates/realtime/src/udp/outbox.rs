@@ -103,6 +103,7 @@ impl Outbox {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
@@ -132,7 +133,7 @@ mod tests {
         assert_eq!((outbox.len(), outbox.bytes.len()), (0, 0));
     }
 
-    proptest! {
+    properties! {
         /// Each queued datagram comes out once, in order, to its receiver, in calls that the kernel takes.
         #[test]
         fn runs_are_the_datagrams_that_were_queued(

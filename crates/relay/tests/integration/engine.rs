@@ -5,6 +5,7 @@ use std::time::Duration;
 use cohaptic_linkfile::{LinkTable, RelayFile};
 use cohaptic_realtime::udp::Ecn;
 use cohaptic_relay::{Arrival, Change, ConfigError, Engine, Form, Intake, Limits, Mesh, Port, RelayConfig};
+use cohaptic_tests_common::properties;
 use cohaptic_units::{self as units, Bytes, Instant};
 use cohaptic_wan::{Fate, LinkModel, Network, NetworkConfig, NodeId, PacketInfo, Path};
 use proptest::prelude::*;
@@ -85,7 +86,7 @@ fn any_link() -> impl Strategy<Value = LinkModel> {
     (0..LINKS.len()).prop_map(|place| link(LINKS[place]))
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
     /// The releases, with their instants, bits and marks, equal the deliveries of a network in virtual time for the same offers, and every datagram is

@@ -1,6 +1,7 @@
 //! Flipped bits are the bits of the link and no others, except for checksums, which stay as right or as wrong as before.
 
 use cohaptic_router::{Content, Framing, Packet};
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant, Probability};
 use cohaptic_wan::{Chance, Checksum, Corruption, Damage, Fate, Flips, Link, LinkConfig, LinkName};
 use etherparse::{NetSlice, PacketBuilder, SlicedPacket, TransportSlice};
@@ -71,7 +72,7 @@ fn icmp(segment: &[u8]) -> bool {
     sum == 0xffff
 }
 
-proptest! {
+properties! {
     /// Flips in the data change only the data and the checksum: exactly the damaged bits are flipped, and the checksum is right.
     #[test]
     fn the_bits_of_the_data_are_flipped_and_no_checksum_notices(

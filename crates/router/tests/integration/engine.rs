@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use cohaptic_linkfile::router::Side;
 use cohaptic_linkfile::{link_from_keys, router::RouterFile};
 use cohaptic_router::{Counters, Departure, Engine, Framing, Packet};
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{DropCause, Fate, Link, LinkName};
 use proptest::prelude::*;
@@ -228,7 +229,7 @@ fn what_a_link_does_to_one_copy_it_does_not_do_to_the_other() {
     assert_eq!((left.len(), left[0].packet.bytes()[1]), (1, 0b11));
 }
 
-proptest! {
+properties! {
     /// For any packets, every loss has a counter, and departures are in order and never before the packet.
     #[test]
     fn everything_is_counted(packets in prop::collection::vec((0_u64..3_000, any::<bool>(), 0_u16..7, 0_usize..600), 1..120), late in 0_u64..20_000) {

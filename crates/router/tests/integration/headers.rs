@@ -4,6 +4,7 @@ use std::net::IpAddr;
 
 use cohaptic_linkfile::router::Protocol;
 use cohaptic_router::{Content, Framing, Headers, Malformed, Packet};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Bytes;
 use etherparse::{IpFragOffset, IpHeaders, IpNumber, Ipv4Header, Ipv6FragmentHeader, NetSlice, PacketBuilder, SlicedPacket, TransportSlice};
 use proptest::prelude::*;
@@ -162,7 +163,7 @@ fn built() -> impl Strategy<Value = (Vec<u8>, Protocol, Option<[u16; 2]>)> {
     )
 }
 
-proptest! {
+properties! {
     #[test]
     fn any_bytes_are_read_without_a_panic(bytes in prop::collection::vec(any::<u8>(), 0..120), first in prop::sample::select(vec![0x45_u8, 0x46, 0x4f, 0x60, 0x00])) {
         let mut bytes = bytes;

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use cohaptic_scene::{ChangeKind, LinkTable, Scene};
+use cohaptic_tests_common::properties;
 use cohaptic_wan::LinkModel;
 use proptest::prelude::*;
 
@@ -144,7 +145,7 @@ fn same(table: &LinkTable, dense: &Dense) {
     assert_eq!(table.exceptions().count() as u64, counts.iter().sum::<u64>() - counts[table.usual()]);
 }
 
-proptest! {
+properties! {
     #[test]
     fn the_sparse_table_is_the_dense_one(
         (peers, entries, changes) in (2..6_usize).prop_flat_map(|peers| {

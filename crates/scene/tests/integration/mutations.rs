@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use cohaptic_scene::{Scene, scene_files};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use crate::every_key::path;
@@ -171,7 +172,7 @@ fn check(text: &str, overrides: &[String]) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig { cases: 4_000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]

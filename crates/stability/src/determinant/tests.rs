@@ -1,3 +1,4 @@
+use cohaptic_tests_common::properties;
 use num_complex::Complex64;
 use proptest::prelude::*;
 
@@ -143,7 +144,7 @@ fn ten_thousand_steps_are_no_more_than_many() {
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]

@@ -1,5 +1,6 @@
 //! Families of scenes, against the analysis of each scene read anew.
 
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use super::*;
@@ -126,7 +127,7 @@ fn a_scratch_serves_one_family_after_another() {
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig::with_cases(60))]
 
     /// The frame on the stack gives the general path's matrix to the bit.
@@ -270,7 +271,7 @@ fn noise_that_adds_next_to_nothing_to_the_mean_motion_is_counted() {
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
     /// The noise of losses against the second moment with its bound: equal peers of any kind.

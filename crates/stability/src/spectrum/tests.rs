@@ -1,3 +1,4 @@
+use cohaptic_tests_common::properties;
 use num_complex::Complex64;
 use proptest::prelude::*;
 
@@ -251,7 +252,7 @@ fn distance(ours: &[Complex64], mut theirs: Vec<Complex64>) -> f64 {
     })
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig::with_cases(3000))]
 
     #[test]

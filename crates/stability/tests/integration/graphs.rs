@@ -40,12 +40,13 @@ impl<const A: usize> Strategy<A> for Neighbours {
 pub(crate) struct OnGraph(pub(crate) Matrix);
 
 impl Strategies for OnGraph {
-    type Strategy<const A: usize> = Neighbours;
+    // The analysis is compiled for each type of strategies. `strategies` has boxed strategies too.
+    type Strategy<const A: usize> = Box<dyn Strategy<A>>;
 
-    fn strategy<const A: usize>(&self, scene: &Scene, peer: usize) -> Neighbours {
+    fn strategy<const A: usize>(&self, scene: &Scene, peer: usize) -> Self::Strategy<A> {
         let degree: f64 = self.0.row(peer).iter().sum();
         let weights = (0..self.0.columns()).filter(|other| *other != peer).map(|other| self.0[(peer, other)] / degree).collect();
-        Neighbours { weights, gains: scene.coordination.gains }
+        Box::new(Neighbours { weights, gains: scene.coordination.gains })
     }
 }
 

@@ -81,10 +81,11 @@ impl<const A: usize> Strategy<A> for Altered {
 }
 
 impl Strategies for Kind {
-    type Strategy<const A: usize> = Altered;
+    // Boxed, as in `graphs`.
+    type Strategy<const A: usize> = Box<dyn Strategy<A>>;
 
-    fn strategy<const A: usize>(&self, scene: &Scene, _peer: usize) -> Altered {
-        Altered { gains: scene.coordination.gains, kind: *self, filtered: [0.0; 3] }
+    fn strategy<const A: usize>(&self, scene: &Scene, _peer: usize) -> Self::Strategy<A> {
+        Box::new(Altered { gains: scene.coordination.gains, kind: *self, filtered: [0.0; 3] })
     }
 }
 

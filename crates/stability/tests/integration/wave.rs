@@ -2,6 +2,7 @@
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::{Method, Verdict, analyse};
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 /// Three peers with the numbers of the paper, all of which touch.
@@ -61,7 +62,7 @@ fn peer() -> impl Strategy<Value = String> {
     })
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
     /// Waves that end with the ticks for which they were sent add no energy, so that a damped object comes to rest over any links.

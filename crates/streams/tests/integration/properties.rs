@@ -1,5 +1,6 @@
 //! Properties over drawn traffic: order, completeness, the laws of delay and rate, and the bounds of memory.
 
+use cohaptic_tests_common::properties;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -15,7 +16,7 @@ fn content(from: usize, count: usize) -> Vec<u8> {
     (from..from + count).map(|place| (place % 251) as u8).collect()
 }
 
-proptest! {
+properties! {
     /// With a constant delay and a rate the arrival of each byte follows from D(n) = max(a(n), D(n−1)) + S, in whole nanoseconds.
     #[test]
     fn every_byte_arrives_in_order_at_the_instant_of_the_law(reads in reads(), delay in 0_u64..30_000_000, bits in 500_000_u64..1_000_000_000) {

@@ -1,3 +1,4 @@
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use super::*;
@@ -168,7 +169,7 @@ fn event() -> impl Strategy<Value = Event> {
     ]
 }
 
-proptest! {
+properties! {
     /// Sessions of random events: refused events change nothing, the kept events make the state again, and a completed session has run each analysed trial of
     /// each condition, and a repetition of each trial that was not valid.
     #[test]

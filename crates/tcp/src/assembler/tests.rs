@@ -1,10 +1,11 @@
 use alloc::vec;
 
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use super::*;
 
-proptest! {
+properties! {
     #[test]
     fn pieces_in_any_order_make_the_text(starts in prop::collection::vec((0usize..200, 1usize..60), 0..80)) {
         let text: Vec<u8> = (0..=255).collect();

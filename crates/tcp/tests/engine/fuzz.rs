@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use cohaptic_tcp::{CongestionControl, Connection, Ecn, Error, Flags, Options, SackBlocks, Segment, TcpConfig};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 
@@ -164,7 +165,7 @@ impl World {
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use cohaptic_tcp::{Connection, Segment, TcpConfig};
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{Fate, Link, LinkName};
 use proptest::prelude::*;
@@ -175,7 +176,7 @@ fn dialogue(words: &str, seed: u64, config: TcpConfig, [there, back]: [u64; 2]) 
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]

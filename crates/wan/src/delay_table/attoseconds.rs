@@ -100,6 +100,7 @@ const NANO: i128 = 1_000_000_000;
 mod tests {
     use alloc::format;
 
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
@@ -124,7 +125,7 @@ mod tests {
         assert_eq!(Attoseconds::parse("1700000000000000001", -9), Some(sent));
     }
 
-    proptest! {
+    properties! {
         #[test]
         fn numbers_read_as_rust_reads_them(value in -1e6..1e6_f64) {
             // Cut below 1e-18 s and rounded once: within one unit of the last place, or of 1e-18.

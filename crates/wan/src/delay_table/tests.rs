@@ -1,6 +1,7 @@
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use super::*;
@@ -49,7 +50,7 @@ fn what_is_wrong_is_named() {
     assert_eq!(error("t,delay\n2,1\n1.5,1\n"), back);
 }
 
-proptest! {
+properties! {
     #[test]
     fn edited_files_never_panic(edits in prop::collection::vec((any::<prop::sample::Index>(), any::<char>()), 0..8)) {
         let mut text: Vec<char> = "sent_ms,arrived,lost\n0,0.024,0\n1,0.026,1\n2,,\n1e3,\"1.024\",0\n".chars().collect();

@@ -112,6 +112,7 @@ impl Places {
 mod tests {
     use alloc::collections::BTreeMap;
 
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
@@ -133,7 +134,7 @@ mod tests {
         assert_eq!((places.len, places.slots.len()), (10_000, 32_768));
     }
 
-    proptest! {
+    properties! {
         /// Numbers of an arithmetic progression, as a ring of hosts or a star uses, mixed with random numbers.
         #[test]
         fn places_are_those_of_a_map(first in 0_u32..1000, step in 1_u32..30_000, count in 0_u32..300, others in prop::collection::vec(0_u32..1 << 29, 0..100)) {

@@ -1,5 +1,6 @@
 //! Instants at which a network must be called so that packets to awaited receivers come out in time.
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use cohaptic_wan::{Bottleneck, Fate, LinkConfig, Network, NetworkConfig, NodeId, PacketEvent, Path};
 use proptest::prelude::*;
@@ -35,7 +36,7 @@ fn reaches(event: &PacketEvent<Payload, Path>) -> bool {
     event.path.to.index() == AWAITED && matches!(event.fate, Fate::Delivered(_))
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(300))]
 
     /// Arrivals at the awaited node are reported at their instants, through queues, access lines and copies. All other events are those of a network without
@@ -89,7 +90,7 @@ fn a_queue_of_some_links_wakes_for_its_own_receiver() {
     let config = NetworkConfig { seed: 1, nodes: ["a", "b", "c"].map(String::from).to_vec(), general: true };
     let receivers = [vec![1], vec![0], vec![1]];
     let to = |from: NodeId| receivers[from.index()].iter().copied().map(NodeId::new).collect::<Vec<_>>();
-    let mut network: Network<u8> = Network::of_some(config, to, |_, _| queue.clone()).awaiting([NodeId::new(1)]);
+    let mut network: Network<u64> = Network::of_some(config, to, |_, _| queue.clone()).awaiting([NodeId::new(1)]);
     for number in 0..3 {
         network.handle_packet(Instant::ZERO, NodeId::new(2), NodeId::new(1), cohaptic_units::Bytes::new(1000), number).unwrap();
     }

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{
     AccessLine, Bottleneck, Delay, Distribution, DropCause, Fate, Link, LinkConfig, LinkName, Network, NetworkConfig, NetworkError, NodeId, Order,
@@ -26,7 +27,7 @@ fn run(config: &LinkConfig, offered: &[(Duration, Bytes)]) -> Vec<PacketEvent<Pa
     drain(&mut subject)
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(600))]
 
     #[test]
@@ -186,13 +187,13 @@ fn a_change_to_in_order_holds_for_what_is_on_the_way() {
     let mut subject =
         Link::new(1, &LinkName::between("a", "b"), LinkConfig { delay: Delay::constant(Duration::from_millis(10)), ..LinkConfig::default() });
     let millis = |millis: u64| at(millis * 1_000_000);
-    subject.handle_packet(millis(0), Bytes::new(1), 'a').unwrap();
+    subject.handle_packet(millis(0), Bytes::new(1), 0).unwrap();
     let shorter = LinkConfig { delay: Delay::constant(Duration::from_millis(1)), order: Order::InOrder, ..LinkConfig::default() };
     subject.set_model(millis(1), shorter).unwrap();
-    subject.handle_packet(millis(2), Bytes::new(1), 'b').unwrap();
+    subject.handle_packet(millis(2), Bytes::new(1), 1).unwrap();
     subject.handle_timeout(millis(10)).unwrap();
-    let arrivals: Vec<(char, Instant)> = std::iter::from_fn(|| subject.poll_event()).map(|event| (event.payload, event.at)).collect();
-    assert_eq!(arrivals, [('a', millis(10)), ('b', millis(10))]);
+    let arrivals: Vec<(Payload, Instant)> = std::iter::from_fn(|| subject.poll_event()).map(|event| (event.payload, event.at)).collect();
+    assert_eq!(arrivals, [(0, millis(10)), (1, millis(10))]);
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{Delay, LinkConfig, NodeId};
 use proptest::collection::vec;
@@ -14,7 +15,7 @@ fn plain_plan() -> BoxedStrategy<Plan> {
     vec(plain_config(), 9).prop_map(|links| Plan { nodes: 3, links, uplinks: vec![None; 3], downlinks: vec![None; 3] }).boxed()
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(300))]
 
     #[test]
@@ -87,7 +88,7 @@ fn acts() -> BoxedStrategy<Vec<(u64, Act)>> {
     vec((0..7_u64, act), 1..80).boxed()
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(400))]
 
     /// Packets that arrive together come out one by one, each at its turn among all others, whenever the driver polls.

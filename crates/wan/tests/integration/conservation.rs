@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use cohaptic_wan::{AccessLine, DropCause, Fate, Link, LinkStats, Network, NodeId};
 use proptest::prelude::*;
@@ -76,7 +77,7 @@ fn audit(link: &Link<Payload>, polled: &Ledger, offered: u64) -> Result<(), Test
     Ok(())
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(600))]
 
     #[test]

@@ -3,6 +3,7 @@
 
 use std::time::Duration;
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::random::{Purpose, Stream};
 use cohaptic_wan::{
@@ -70,7 +71,7 @@ fn probes_wait_as_the_m_d_1_queue_says() {
                 let mut now = 1e9;
                 let mut number = 0;
                 while now < 21e9 {
-                    link.handle_packet(Instant::from_nanos(now as u64), Bytes::ZERO, ()).unwrap();
+                    link.handle_packet(Instant::from_nanos(now as u64), Bytes::ZERO, 0_u64).unwrap();
                     let gap: f64 = Exp1.sample(&mut stream.packet(number).draws(Purpose::Jitter));
                     (now, number) = (now + gap * 4e6, number + 1);
                 }
@@ -108,7 +109,7 @@ fn ends(bottleneck: Bottleneck, rows: &str, offered: &[u64]) -> (Vec<(u64, bool)
     let config = LinkConfig { bottleneck: Some(bottleneck), cross_traffic: recorded(rows), ..LinkConfig::default() };
     let mut link = Link::new(1, &LinkName::between("a", "b"), config);
     for now in offered {
-        link.handle_packet(Instant::from_nanos(now * 1_000), Bytes::new(10), ()).unwrap();
+        link.handle_packet(Instant::from_nanos(now * 1_000), Bytes::new(10), 0_u64).unwrap();
     }
     link.handle_timeout(Instant::MAX).unwrap();
     let events = std::iter::from_fn(|| link.poll_event());
@@ -197,7 +198,7 @@ fn drivers_of_every_habit_see_the_same() {
                     link.handle_timeout(at).unwrap();
                     events.extend(std::iter::from_fn(|| link.poll_event()).map(|event| (at, event.record)));
                 }
-                link.handle_packet(now, Bytes::new(60 + number % 3), ()).unwrap();
+                link.handle_packet(now, Bytes::new(60 + number % 3), 0_u64).unwrap();
                 if is_punctual {
                     events.extend(std::iter::from_fn(|| link.poll_event()).map(|event| (now, event.record)));
                 }
@@ -264,7 +265,7 @@ fn cross_packets_wake_nobody() {
     let mut link = Link::new(1, &LinkName::between("a", "b"), config);
     link.handle_timeout(Instant::from_nanos(50)).unwrap();
     assert_eq!(link.poll_timeout(), None);
-    link.handle_packet(Instant::from_nanos(50), Bytes::new(10), ()).unwrap();
+    link.handle_packet(Instant::from_nanos(50), Bytes::new(10), 0_u64).unwrap();
     let mut wakes = 0;
     while let Some(at) = link.poll_timeout() {
         link.handle_timeout(at).unwrap();
@@ -276,7 +277,7 @@ fn cross_packets_wake_nobody() {
     assert_eq!(wakes, 1);
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(200))]
 
     /// Links of every kind, changed links and links of a network give the same events and counts, wherever a driver catches up between two packets.

@@ -10,7 +10,7 @@ use crate::any_link::JITTERS;
 /// Returns the delays \[ns\] of packets sent a second apart, so far apart that no packet overtakes another.
 fn delays(seed: u64, delay: &Delay, count: u64) -> Vec<f64> {
     let mut link = Link::new(seed, &LinkName::between("a", "b"), LinkConfig { delay: delay.clone(), ..LinkConfig::default() });
-    (0..count).for_each(|number| link.handle_packet(Instant::from_nanos(number * 1_000_000_000), Bytes::new(64), ()).unwrap());
+    (0..count).for_each(|number| link.handle_packet(Instant::from_nanos(number * 1_000_000_000), Bytes::new(64), 0_u64).unwrap());
     link.handle_timeout(Instant::MAX).unwrap();
     std::iter::from_fn(|| link.poll_event()).map(|event| (event.at - event.offered).as_nanos() as f64).collect()
 }
@@ -49,7 +49,7 @@ fn reordered(seed: u64, jitter: Duration, distribution: Distribution, spacing: D
     let mut link = Link::new(seed, &LinkName::between("a", "b"), LinkConfig { delay, ..LinkConfig::default() });
     let mut now = Instant::ZERO;
     for _ in 0..100 * BATCH {
-        link.handle_packet(now, Bytes::new(64), ()).unwrap();
+        link.handle_packet(now, Bytes::new(64), 0_u64).unwrap();
         now += spacing;
     }
     link.handle_timeout(Instant::MAX).unwrap();

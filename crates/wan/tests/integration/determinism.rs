@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{Distribution, DropCause, Fate, Layout, Link, LinkConfig, LinkName, Loss, Network, NetworkConfig, NodeId, PacketEvent, Path};
 use proptest::collection::vec;
@@ -82,7 +83,7 @@ fn lost(fates: &[Fate]) -> Vec<bool> {
     fates.iter().map(|fate| *fate == Fate::Dropped(DropCause::Loss)).collect()
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(400))]
 
     #[test]

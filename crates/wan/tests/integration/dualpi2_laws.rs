@@ -3,7 +3,7 @@
 use cohaptic_units::{Bytes, Ecn, Instant};
 use cohaptic_wan::{Bottleneck, Discipline, DropCause, DualPi2, Fate, Link, LinkConfig, LinkName, Loss, PacketEvent, PacketInfo, Pattern};
 
-use crate::random_links::rate;
+use crate::random_links::{Payload, rate};
 
 const MICRO: u64 = 1_000;
 const MILLI: u64 = 1_000_000;
@@ -11,28 +11,29 @@ const MILLI: u64 = 1_000_000;
 /// Instant \[ns\], size \[bytes\] and codepoint of an offered packet.
 type Offered = (u64, u64, Ecn);
 
-/// Returns the events of a link of 8 Mbit/s, on which a byte takes a microsecond, in the order of the offers.
-fn events(dualpi2: DualPi2, offered: impl IntoIterator<Item = Offered>) -> Vec<PacketEvent<Ecn>> {
+/// Returns the events of a link of 8 Mbit/s, on which a byte takes a microsecond, in the order of the offers. The payload of a packet has the two bits of its
+/// codepoint.
+fn events(dualpi2: DualPi2, offered: impl IntoIterator<Item = Offered>) -> Vec<PacketEvent<Payload>> {
     events_behind(LinkConfig::default(), dualpi2, offered)
 }
 
 /// Like [`events`], with the other stages of `config`.
-fn events_behind(config: LinkConfig, dualpi2: DualPi2, offered: impl IntoIterator<Item = Offered>) -> Vec<PacketEvent<Ecn>> {
+fn events_behind(config: LinkConfig, dualpi2: DualPi2, offered: impl IntoIterator<Item = Offered>) -> Vec<PacketEvent<Payload>> {
     let bottleneck = Some(Bottleneck { discipline: Discipline::DualPi2(dualpi2), ..Bottleneck::at_rate(rate(8_000_000)) });
     let mut link = Link::new(68, &LinkName::between("a", "b"), LinkConfig { bottleneck, ..config });
     let mut offered: Vec<Offered> = offered.into_iter().collect();
     offered.sort_by_key(|(at, ..)| *at);
     for (at, size, ecn) in offered {
-        link.handle_packet(Instant::from_nanos(at), PacketInfo { size: Bytes::new(size), ecn }, ecn).unwrap();
+        link.handle_packet(Instant::from_nanos(at), PacketInfo { size: Bytes::new(size), ecn }, ecn.bits().into()).unwrap();
     }
     link.handle_timeout(Instant::MAX).unwrap();
-    let mut events: Vec<PacketEvent<Ecn>> = std::iter::from_fn(|| link.poll_event()).collect();
+    let mut events: Vec<PacketEvent<Payload>> = std::iter::from_fn(|| link.poll_event()).collect();
     events.sort_by_key(|event| event.sequence);
     events
 }
 
 /// Time of a delivered packet between its offer and the begin of its transmission \[ns\].
-fn wait(event: &PacketEvent<Ecn>) -> Option<u64> {
+fn wait(event: &PacketEvent<Payload>) -> Option<u64> {
     let Fate::Delivered(at) = event.fate else { return None };
     Some(at.as_nanos() - event.offered.as_nanos() - event.size.get() * MICRO)
 }
@@ -42,7 +43,7 @@ fn mean(values: impl IntoIterator<Item = u64>) -> f64 {
     sum as f64 / f64::from(count)
 }
 
-fn share(events: &[&PacketEvent<Ecn>], is_so: impl Fn(&PacketEvent<Ecn>) -> bool) -> f64 {
+fn share(events: &[&PacketEvent<Payload>], is_so: impl Fn(&PacketEvent<Payload>) -> bool) -> f64 {
     events.iter().filter(|event| is_so(event)).count() as f64 / events.len() as f64
 }
 
@@ -88,7 +89,7 @@ fn the_classic_queue_keeps_its_share() {
         let (mut low, mut classic) = (0.0, 0.0);
         // The first packet met an idle line.
         for event in &events[1..] {
-            let sum = if event.payload == Ecn::Capable1 { &mut low } else { &mut classic };
+            let sum = if event.payload == u64::from(Ecn::Capable1.bits()) { &mut low } else { &mut classic };
             *sum += event.size.get() as f64;
             if low >= 300.0 * 1_998.0 || classic >= 1_500.0 * 1_998.0 {
                 break;
@@ -108,8 +109,9 @@ fn the_marks_of_one_queue_are_the_root_of_the_drops_of_the_other() {
     let classic = (0..100_000).map(|number| (number * 800 * MICRO, 1_000, Ecn::NotCapable));
     let low = (0..8_000).map(|number| (number * 10 * MILLI + 37 * MICRO, 100, Ecn::Capable1));
     let events = events(DualPi2::default(), classic.chain(low));
-    let late =
-        |ecn| -> Vec<&PacketEvent<Ecn>> { events.iter().filter(|event| event.payload == ecn && event.offered.as_nanos() > 20_000 * MILLI).collect() };
+    let late = |ecn: Ecn| -> Vec<&PacketEvent<Payload>> {
+        events.iter().filter(|event| event.payload == u64::from(ecn.bits()) && event.offered.as_nanos() > 20_000 * MILLI).collect()
+    };
     let (classic, low) = (late(Ecn::NotCapable), late(Ecn::Capable1));
     let dropped = share(&classic, |event| event.fate == Fate::Dropped(DropCause::DualPi2));
     let marked = share(&low, |event| event.marked);
@@ -126,7 +128,7 @@ fn the_marks_of_one_queue_are_the_root_of_the_drops_of_the_other() {
 #[test]
 fn a_flood_with_ect_1_is_dropped_under_overload() {
     let events = events(DualPi2::default(), (0..160_000).map(|number| (number * 500 * MICRO, 1_000, Ecn::Capable1)));
-    let late: Vec<&PacketEvent<Ecn>> = events.iter().filter(|event| event.offered.as_nanos() > 20_000 * MILLI).collect();
+    let late: Vec<&PacketEvent<Payload>> = events.iter().filter(|event| event.offered.as_nanos() > 20_000 * MILLI).collect();
     let dropped = share(&late, |event| event.fate == Fate::Dropped(DropCause::DualPi2));
     assert!((dropped - 0.5).abs() < 0.001, "{dropped}");
     assert!(late.iter().all(|event| event.marked || wait(event).is_none()));
@@ -143,7 +145,7 @@ fn classic_packets_with_ecn_are_marked() {
     let standing = (0..101).map(|_| (0, 1_000, Ecn::Capable0));
     let steady = (1..20_000).map(|number| (number * MILLI, 1_000, Ecn::Capable0));
     let events = events(dualpi2, standing.chain(steady));
-    let late: Vec<&PacketEvent<Ecn>> = events.iter().filter(|event| event.offered.as_nanos() > 1_000 * MILLI).collect();
+    let late: Vec<&PacketEvent<Payload>> = events.iter().filter(|event| event.offered.as_nanos() > 1_000 * MILLI).collect();
     assert!(late.iter().all(|event| wait(event).is_some()));
     let marked = share(&late, |event| event.marked);
     assert!((marked - 0.01).abs() < 0.0006, "{marked}");

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{Bottleneck, Delay, Distribution, DropCause, Fate, Framing, Layout, Link, LinkConfig, LinkName, Loss, NodeId, Order};
 use proptest::collection::vec;
@@ -38,7 +39,7 @@ fn extreme_config() -> BoxedStrategy<LinkConfig> {
         .boxed()
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(1_000))]
 
     #[test]

@@ -3,6 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use cohaptic_wan::{Event, EventQueue};
 use proptest::collection::vec;
@@ -87,7 +88,7 @@ fn steps() -> BoxedStrategy<Vec<Step>> {
     .boxed()
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(1_500))]
 
     #[test]

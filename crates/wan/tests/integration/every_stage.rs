@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Ecn, Instant};
 use cohaptic_wan::{
     Discipline, Displacement, DropCause, Fate, FateLog, Layout, Link, LinkConfig, LinkModel, Network, NetworkConfig, NodeId, Order, PacketEvent,
@@ -105,7 +106,7 @@ fn of_network(event: PacketEvent<Payload, Path>) -> Seen {
     (event.sequence, event.copy / 2, event.offered, event.at, event.size, event.payload, event.fate, event.marked, event.damage)
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(240))]
 
     #[test]

@@ -68,7 +68,7 @@ fn through_the_link() -> Vec<f64> {
     let framing = Framing { overhead: HEADERS, cells: None };
     let bucket = TokenBucket { rate: rate(RATE), burst: Bytes::new(BURST), peak: None, framing, limit: None };
     let mut link = Link::new(1, &LinkName::between("a", "b"), LinkConfig { token_bucket: Some(bucket), ..LinkConfig::default() });
-    (0..PACKETS).for_each(|_| link.handle_packet(Instant::ZERO, Bytes::new(PAYLOAD as u64), ()).unwrap());
+    (0..PACKETS).for_each(|_| link.handle_packet(Instant::ZERO, Bytes::new(PAYLOAD as u64), 0_u64).unwrap());
     link.handle_timeout(Instant::MAX).unwrap();
     std::iter::from_fn(|| link.poll_event()).map(|event| event.at.as_secs_f64()).collect()
 }

@@ -17,7 +17,7 @@ pub(crate) const NORMAL_9995: f64 = 3.2905;
 /// Returns the losses among `count` packets: `true` for a lost packet, indexed by packet.
 pub(crate) fn losses(seed: u64, loss: Loss, count: usize) -> Vec<bool> {
     let mut link = Link::new(seed, &LinkName::between("a", "b"), LinkConfig { loss, ..LinkConfig::default() });
-    (0..count as u64).for_each(|number| link.handle_packet(at(number), Bytes::new(64), ()).unwrap());
+    (0..count as u64).for_each(|number| link.handle_packet(at(number), Bytes::new(64), 0_u64).unwrap());
     link.handle_timeout(Instant::MAX).unwrap();
     let mut lost = vec![false; count];
     while let Some(event) = link.poll_event() {
@@ -142,7 +142,7 @@ fn a_queue_of_regular_arrivals_drops_exactly_what_does_not_fit() {
             let bound = if bytes { QueueLimit::Bytes(Bytes::new(3 * limit + 2)) } else { QueueLimit::Packets(limit) };
             let bottleneck = Bottleneck { limit: Some(bound), ..Bottleneck::at_rate(rate(BYTE_A_MICROSECOND)) };
             let mut link = Link::new(1, &LinkName::between("a", "b"), LinkConfig { bottleneck: Some(bottleneck), ..LinkConfig::default() });
-            (0..COUNT).for_each(|number| link.handle_packet(at(number * 2_000), Bytes::new(3), ()).unwrap());
+            (0..COUNT).for_each(|number| link.handle_packet(at(number * 2_000), Bytes::new(3), 0_u64).unwrap());
             link.handle_timeout(Instant::MAX).unwrap();
             let mut fates: Vec<(u64, Fate)> = std::iter::from_fn(|| link.poll_event()).map(|event| (event.sequence, event.fate)).collect();
             fates.sort_by_key(|(sequence, _)| *sequence);
@@ -177,7 +177,7 @@ fn packets_at_random_wait_as_long_as_pollaczek_and_khinchine_say() {
         for number in 0..COUNT {
             let gap: f64 = Exp1.sample(&mut gaps.packet(number).draws(Purpose::Jitter));
             now += Duration::from_secs_f64(gap * SERVICE / load / 1e9);
-            link.handle_packet(now, Bytes::new(64), ()).unwrap();
+            link.handle_packet(now, Bytes::new(64), 0_u64).unwrap();
         }
         link.handle_timeout(Instant::MAX).unwrap();
 

@@ -95,7 +95,7 @@ fn losses_in_time_have_the_memory_of_the_time_between_packets() {
         let lost: Vec<bool> = (0..(BATCHES * BATCH) as u64)
             .map(|number| {
                 let now = Instant::from_nanos(number * spacing * 1_000_000);
-                link.handle_packet(now, Bytes::new(64), ()).unwrap();
+                link.handle_packet(now, Bytes::new(64), 0_u64).unwrap();
                 link.handle_timeout(now).unwrap();
                 link.poll_event().unwrap().fate == Fate::Dropped(DropCause::Loss)
             })
@@ -116,13 +116,13 @@ fn copies_and_damage_are_as_many_as_the_binomial_law_allows() {
         let corruption = Some(Corruption { bits, within: None, checksum: Checksum::Discards });
         let config = LinkConfig { corruption, ..LinkConfig::default() };
         let mut link = Link::new(51, &LinkName::between("a", "b"), config);
-        (0..100_000).for_each(|number| link.handle_packet(Instant::from_nanos(number), Bytes::new(64), ()).unwrap());
+        (0..100_000).for_each(|number| link.handle_packet(Instant::from_nanos(number), Bytes::new(64), 0_u64).unwrap());
         link.handle_timeout(Instant::MAX).unwrap();
         let damaged = link.stats().damaged();
         assert!((least..=most).contains(&damaged), "{damaged} of 100,000 damaged by {bits:?}");
         assert_eq!(link.stats().dropped(DropCause::Checksum), damaged);
     }
     let mut link = Link::new(52, &LinkName::between("a", "b"), LinkConfig { duplication: copies, ..LinkConfig::default() });
-    (0..100_000).for_each(|number| link.handle_packet(Instant::from_nanos(number), Bytes::new(64), ()).unwrap());
+    (0..100_000).for_each(|number| link.handle_packet(Instant::from_nanos(number), Bytes::new(64), 0_u64).unwrap());
     assert!((9_688..=10_313).contains(&link.stats().duplicated()), "{}", link.stats().duplicated());
 }

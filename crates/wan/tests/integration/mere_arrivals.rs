@@ -1,5 +1,6 @@
 //! Networks whose driver asks for arrivals alone, and not for other events.
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use cohaptic_wan::NodeId;
 use proptest::prelude::*;
@@ -12,7 +13,7 @@ fn direct() -> BoxedStrategy<Plan> {
     proptest::collection::vec(plain_config(), 9).prop_map(move |links| Plan { nodes: 3, links, uplinks: nowhere(), downlinks: nowhere() }).boxed()
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(300))]
 
     /// Arrivals come in the same order and at the same instants, whether polled as mere arrivals, as far as the network gives those, or as events. A network

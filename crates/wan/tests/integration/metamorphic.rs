@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant, Rate};
 use cohaptic_wan::{
     Between, Bottleneck, Chance, Checksum, Corruption, Damage, Delay, Discipline, Distribution, DropCause, Fate, FateLog, Flips, Framing,
@@ -164,7 +165,7 @@ fn agree<T: PartialEq + std::fmt::Debug>(one: &BTreeMap<(u64, u8), T>, other: &B
     Ok(())
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(160))]
 
     #[test]

@@ -1,5 +1,6 @@
 //! Links made at their first use, against links made at the beginning: all events are equal.
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use cohaptic_wan::{Network, Path};
 use proptest::prelude::*;
@@ -14,7 +15,7 @@ enum Way {
     Relay,
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(300))]
 
     #[test]

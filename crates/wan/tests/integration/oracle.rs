@@ -1,5 +1,6 @@
 //! Links and networks against the naive model: every fate and every instant, to the nanosecond.
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{Bottleneck, Delay, DropCause, Fate, LinkConfig, LinkName, Loss, NodeId, Order, Outages, QueueLimit, Service};
 use proptest::collection::vec;
@@ -77,7 +78,7 @@ fn changes(bottlenecks: bool) -> BoxedStrategy<(LinkConfig, Vec<Operation>)> {
     (config(), vec(operation, 1..80)).boxed()
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(1_500))]
 
     #[test]
@@ -189,7 +190,7 @@ fn a_departure_from_a_link_makes_room_for_what_leaves_the_uplink_at_that_instant
     assert_eq!(fates, [(0, delivered(3)), (1, delivered(5)), (2, delivered(7)), (3, Fate::Dropped(DropCause::QueueFull))]);
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(300))]
 
     /// Packets that wait when the bottleneck is removed leave at once, in order.

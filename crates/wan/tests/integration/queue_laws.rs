@@ -10,7 +10,7 @@ use cohaptic_wan::{
 use rand_distr::{Distribution as _, Exp1};
 
 use crate::laws::NORMAL_9995;
-use crate::random_links::rate;
+use crate::random_links::{Payload, rate};
 
 const MILLI: u64 = 1_000_000;
 
@@ -32,7 +32,7 @@ fn waits(seed: u64, load: f64, count: u64) -> (Vec<(u64, u64)>, Vec<u64>) {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "minutes")]
         offered.push((exact as u64, (service * SERVICE).round() as u64));
         let (now, size) = offered[offered.len() - 1];
-        link.handle_packet(Instant::from_nanos(now), Bytes::new(size), ()).unwrap();
+        link.handle_packet(Instant::from_nanos(now), Bytes::new(size), 0_u64).unwrap();
     }
     link.handle_timeout(Instant::MAX).unwrap();
     let events = std::iter::from_fn(|| link.poll_event());
@@ -89,7 +89,7 @@ fn under_constant_overload_codel_drops_at_interval_over_root_n() {
     let bottleneck = Some(Bottleneck { discipline, ..Bottleneck::at_rate(rate(800_000)) });
     let mut link = Link::new(64, &LinkName::between("a", "b"), LinkConfig { bottleneck, ..LinkConfig::default() });
     // 100 bytes take a millisecond; two are offered in one.
-    (0..8_000).for_each(|number| link.handle_packet(Instant::from_nanos(number * MILLI / 2), Bytes::new(100), ()).unwrap());
+    (0..8_000).for_each(|number| link.handle_packet(Instant::from_nanos(number * MILLI / 2), Bytes::new(100), 0_u64).unwrap());
     let drops: Vec<u64> = std::iter::from_fn(|| link.poll_event())
         .filter(|event| event.fate == Fate::Dropped(DropCause::CoDel))
         .map(|event| event.at.as_nanos())
@@ -113,7 +113,7 @@ fn under_constant_overload_codel_marks_what_is_capable() {
     let bottleneck = Some(Bottleneck { discipline, ..Bottleneck::at_rate(rate(800_000)) });
     let mut link = Link::new(65, &LinkName::between("a", "b"), LinkConfig { bottleneck, ..LinkConfig::default() });
     let info = cohaptic_wan::PacketInfo { size: Bytes::new(100), ecn: Ecn::Capable0 };
-    (0..4_000).for_each(|number| link.handle_packet(Instant::from_nanos(number * 500_000), info, ()).unwrap());
+    (0..4_000).for_each(|number| link.handle_packet(Instant::from_nanos(number * 500_000), info, 0_u64).unwrap());
     link.handle_timeout(Instant::MAX).unwrap();
     assert_eq!((link.stats().dropped_in_all(), link.stats().delivered()), (0, 4_000));
     let marked: Vec<u64> = std::iter::from_fn(|| link.poll_event()).filter(|event| event.marked).map(|event| event.at.as_nanos()).collect();
@@ -133,8 +133,8 @@ fn twelve_megabit(limit: u64, discipline: Discipline) -> LinkConfig {
 }
 
 /// Sends packets over a link whose payloads are flows, and returns what became of them.
-fn over_flows(config: LinkConfig, offered: &[(u64, u32, u64)]) -> Vec<cohaptic_wan::PacketEvent<u32>> {
-    let mut link = Link::new(66, &LinkName::between("a", "b"), config).with_flows(|flow| *flow);
+fn over_flows(config: LinkConfig, offered: &[(u64, Payload, u64)]) -> Vec<cohaptic_wan::PacketEvent<Payload>> {
+    let mut link = Link::new(66, &LinkName::between("a", "b"), config).with_flows(|flow| u32::try_from(*flow).unwrap());
     let mut offered = offered.to_vec();
     offered.sort_by_key(|(at, ..)| *at);
     for (at, flow, size) in offered {
@@ -148,9 +148,9 @@ fn over_flows(config: LinkConfig, offered: &[(u64, u32, u64)]) -> Vec<cohaptic_w
 /// most a millisecond, though 100 others wait; behind tail drop they wait for the whole queue.
 #[test]
 fn a_lone_packet_beside_backlogged_flows_waits_for_the_packet_on_the_line_only() {
-    let backlog = (0..2_000_u64).map(|number| (number * MILLI / 2, u32::try_from(number % 8).unwrap(), 1500));
+    let backlog = (0..2_000_u64).map(|number| (number * MILLI / 2, number % 8, 1500));
     let lone = (1..20_u64).map(|number| (number * 50 * MILLI + 123_457, 8, 100));
-    let offered: Vec<(u64, u32, u64)> = backlog.chain(lone).collect();
+    let offered: Vec<(u64, Payload, u64)> = backlog.chain(lone).collect();
     let waits = |discipline| -> Vec<u64> {
         let events = over_flows(twelve_megabit(100, discipline), &offered);
         let own = 100 * 8_000 / 12;
@@ -170,10 +170,10 @@ fn a_lone_packet_beside_backlogged_flows_waits_for_the_packet_on_the_line_only()
 fn flows_share_the_line_by_bytes() {
     let small = (0..5_000_u64).map(|number| (number * MILLI / 5, 1, 300));
     let large = (0..1_000_u64).map(|number| (number * MILLI, 2, 1500));
-    let offered: Vec<(u64, u32, u64)> = small.chain(large).collect();
+    let offered: Vec<(u64, Payload, u64)> = small.chain(large).collect();
     let events = over_flows(twelve_megabit(10_240, Discipline::FqCoDel(FqCoDel::default())), &offered);
     let of = |flow| -> u64 {
-        let arrived = |event: &&cohaptic_wan::PacketEvent<u32>| matches!(event.fate, Fate::Delivered(at) if at.as_nanos() < 1_000 * MILLI);
+        let arrived = |event: &&cohaptic_wan::PacketEvent<Payload>| matches!(event.fate, Fate::Delivered(at) if at.as_nanos() < 1_000 * MILLI);
         events.iter().filter(|event| event.payload == flow).filter(arrived).map(|event| event.size.get()).sum()
     };
     // 12 Mbit/s carry 1,500,000 bytes in this second. The flows differ by some turns.
@@ -184,8 +184,8 @@ fn flows_share_the_line_by_bytes() {
 /// A full queue drops half of the longest flow from its head, at most 64 packets. A flow with few packets loses none.
 #[test]
 fn overflow_drops_from_the_longest_queue() {
-    let drops = |fat: u64, limit: u64| -> Vec<(u32, u64)> {
-        let offered: Vec<(u64, u32, u64)> = (0..3).map(|number| (number, 1, 1500)).chain((0..fat).map(|number| (10 + number, 2, 1500))).collect();
+    let drops = |fat: u64, limit: u64| -> Vec<(Payload, u64)> {
+        let offered: Vec<(u64, Payload, u64)> = (0..3).map(|number| (number, 1, 1500)).chain((0..fat).map(|number| (10 + number, 2, 1500))).collect();
         over_flows(twelve_megabit(limit, Discipline::FqCoDel(FqCoDel::default())), &offered)
             .iter()
             .filter(|event| event.fate == Fate::Dropped(DropCause::QueueFull))
@@ -193,14 +193,15 @@ fn overflow_drops_from_the_longest_queue() {
             .collect()
     };
     // The first packet is on the line, two of flow 1 wait, and the 49th of flow 2 is one too many: 24.5 packets are half.
-    let half: Vec<(u32, u64)> = (3..28).map(|sequence| (2, sequence)).collect();
+    let half: Vec<(Payload, u64)> = (3..28).map(|sequence| (2, sequence)).collect();
     assert_eq!(drops(49, 50), half);
-    let most: Vec<(u32, u64)> = (3..67).map(|sequence| (2, sequence)).collect();
+    let most: Vec<(Payload, u64)> = (3..67).map(|sequence| (2, sequence)).collect();
     assert_eq!(drops(499, 500), most);
 }
 
 /// PIE by the text of RFC 8033, with a timer that goes off every 15 ms, over packets that wait in a list.
 mod pie {
+    use cohaptic_tests_common::properties;
     use cohaptic_wan::random::{Purpose, Stream};
     use cohaptic_wan::{PacketInfo, Pie};
     use proptest::prelude::*;
@@ -328,7 +329,7 @@ mod pie {
         let mut link = Link::new(67, &LinkName::between("a", "b"), LinkConfig { bottleneck, ..LinkConfig::default() });
         for (at, size, ecn_capable) in offered {
             let info = PacketInfo { size: Bytes::new(*size), ecn: if *ecn_capable { Ecn::Capable0 } else { Ecn::NotCapable } };
-            link.handle_packet(Instant::from_nanos(*at), info, ()).unwrap();
+            link.handle_packet(Instant::from_nanos(*at), info, 0_u64).unwrap();
         }
         link.handle_timeout(Instant::MAX).unwrap();
         let mut fates: Fates = vec![Err(DropCause::EndOfLog); offered.len()];
@@ -366,7 +367,7 @@ mod pie {
             .boxed()
     }
 
-    proptest! {
+    properties! {
         #![proptest_config(crate::random_links::cases(96))]
 
         #[test]
@@ -401,7 +402,7 @@ mod pie {
 /// On an uplink shared by two receivers, each pair of sender and receiver is a flow; behind a network that knows better, each payload.
 #[test]
 fn the_flows_of_a_network_are_its_pairs_or_what_it_is_told() {
-    let wait = |flows: Option<fn(Path, &u32) -> u32>, to: u16| {
+    let wait = |flows: Option<fn(Path, &Payload) -> u32>, to: u16| {
         let nodes = ["a", "b", "c"].map(str::to_owned).to_vec();
         let network = Network::new(NetworkConfig { seed: 1, nodes, general: false }, |_, _| LinkConfig::default());
         let line = twelve_megabit(100, Discipline::FqCoDel(FqCoDel::default()));
@@ -419,5 +420,5 @@ fn the_flows_of_a_network_are_its_pairs_or_what_it_is_told() {
     };
     // A quantum of 1514 bytes lets the first flow send two packets. The lone packet is the third on the line or, in the same flow as the others, the last.
     assert_eq!([wait(None, 2), wait(None, 1)], [3, 21]);
-    assert_eq!([wait(Some(|_, payload| *payload), 1), wait(Some(|_, _| 3), 2)], [3, 21]);
+    assert_eq!([wait(Some(|_, payload| u32::try_from(*payload).unwrap()), 1), wait(Some(|_, _| 3), 2)], [3, 21]);
 }

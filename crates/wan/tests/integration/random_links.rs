@@ -22,7 +22,8 @@ pub(crate) const BYTE_A_MICROSECOND: u64 = 8_000_000;
 
 pub(crate) const SEED: u64 = 2015;
 
-/// Payload of a packet: its number among all offered packets, so that a payload in a wrong packet is noticed.
+/// Payload of a packet: its number among all offered packets, so that a payload in a wrong packet is noticed. All tests have this type, because each type of
+/// payload compiles all code of links and networks again.
 pub(crate) type Payload = u64;
 
 /// Proptest without files.

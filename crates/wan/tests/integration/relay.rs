@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{AccessLine, Delay, DropCause, Fate, Link, LinkConfig, LinkName, Network, NetworkConfig, NodeId, PacketEvent, PacketRecord, Path};
 use proptest::prelude::*;
@@ -43,7 +44,7 @@ fn told<L>(record: &PacketRecord<L>, later: Duration) -> Told {
     (record.sequence, record.offered, at, record.fate.name(), record.marked, record.damaged)
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(300))]
 
     /// The uplink does with one packet what it does by itself, and each receiver sees that: a loss, delay, copy, mark or damage is one for all.

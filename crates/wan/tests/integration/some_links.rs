@@ -49,5 +49,5 @@ fn what_becomes_of_a_packet_does_not_depend_on_other_links() {
 #[should_panic(expected = "receivers are other nodes, in order")]
 fn receivers_that_are_not_in_order_are_refused() {
     let config = NetworkConfig { seed: 0, nodes: ["a", "b", "c"].map(String::from).to_vec(), general: false };
-    let _ = Network::<()>::of_some(config, |_| [NodeId(2), NodeId(1)], link);
+    let _ = Network::<u64>::of_some(config, |_| [NodeId(2), NodeId(1)], link);
 }

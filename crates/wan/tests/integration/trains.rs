@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{Delay, LinkConfig, Network, NetworkConfig, NodeId, PacketEvent, PacketRecord, Path};
 use proptest::prelude::*;
@@ -43,7 +44,7 @@ fn poll(network: &mut Network<Payload>, now: Instant) -> Vec<PacketRecord<Path>>
     }
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(300))]
 
     /// Packets of trains have the numbers, the instants and the order of packets that are handed in one by one, and are counted like them.
@@ -91,7 +92,7 @@ fn a_link_of_constant_delay_takes_trains_and_others_do_not() {
     let config = || NetworkConfig { seed: 1, nodes: ["a".into(), "b".into()].into(), general: false };
     let path = Path { from: NodeId::new(0), to: NodeId::new(1) };
     let network = |link: LinkConfig| Network::new(config(), move |_, _| link.clone());
-    let taken = |mut network: Network<u8>, packets| network.handle_train(Instant::ZERO, path, packets, 7);
+    let taken = |mut network: Network<Payload>, packets| network.handle_train(Instant::ZERO, path, packets, 7);
     for packets in [1, 2, 4_194_303] {
         assert_eq!(taken(network(constant()), packets), Ok(Instant::ZERO + delay));
     }

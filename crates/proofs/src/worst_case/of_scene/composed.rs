@@ -79,6 +79,7 @@ impl Composed {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
@@ -99,7 +100,7 @@ mod tests {
     const HEARD: usize = 4;
     const UNKNOWNS: usize = 6;
 
-    proptest! {
+    properties! {
         /// Against the exact composition of exact rows, in integers.
         #[test]
         fn compositions_are_within_their_bounds(

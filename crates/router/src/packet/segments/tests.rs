@@ -1,5 +1,6 @@
 use std::sync::Arc;
 
+use cohaptic_tests_common::properties;
 use etherparse::{PacketBuilder, TcpOptions};
 use proptest::prelude::*;
 
@@ -112,7 +113,7 @@ fn shared(packets: Vec<Packet>) -> Vec<Arc<Packet>> {
     packets.into_iter().map(Arc::new).collect()
 }
 
-proptest! {
+properties! {
     /// `etherparse` reads every packet as complete, with right checksums, and the packets together carry the data of the segment.
     #[test]
     fn the_packets_of_a_segment_are_right(wanted in wanted()) {

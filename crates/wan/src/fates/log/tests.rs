@@ -1,3 +1,4 @@
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use super::*;
@@ -121,7 +122,7 @@ prop_compose! {
     }
 }
 
-proptest! {
+properties! {
     #[test]
     fn a_log_comes_back_exactly_from_its_text(records in logs(), turn in 0..40_usize) {
         let log = FateLog::new(records.iter().copied()).unwrap();

@@ -16,11 +16,11 @@ fn config(words: &str) -> LinkConfig {
 }
 
 /// Returns the fates of packets that come every millisecond, in the order of packets and copies.
-fn run(words: &str, packets: u64) -> Vec<PacketEvent<()>> {
+fn run(words: &str, packets: u64) -> Vec<PacketEvent<u64>> {
     let mut link = Link::new(3, &LinkName::between("a", "b"), config(words));
     let mut events = Vec::new();
     for number in 0..packets {
-        link.handle_packet(Instant::from_nanos(number * 1_000_000), Bytes::new(100), ()).unwrap();
+        link.handle_packet(Instant::from_nanos(number * 1_000_000), Bytes::new(100), 0).unwrap();
         events.extend(core::iter::from_fn(|| link.poll_event()));
     }
     link.handle_timeout(Instant::MAX).unwrap();

@@ -3,6 +3,7 @@
 use core::num::{NonZeroU32, NonZeroU64};
 use core::time::Duration;
 
+use cohaptic_tests_common::properties;
 use proptest::option::of;
 use proptest::prelude::*;
 
@@ -164,7 +165,7 @@ fn salad() -> BoxedStrategy<String> {
     prop::collection::vec(word, 0..12).prop_map(|words| words.join(" ")).boxed()
 }
 
-proptest! {
+properties! {
     #[test]
     fn what_is_printed_reads_back_to_the_same(netem in netem()) {
         prop_assert_eq!(netem.check(), Ok(()));

@@ -1,5 +1,6 @@
 use core::time::Duration;
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Ecn, Probability, Rate};
 use proptest::prelude::*;
 
@@ -44,9 +45,10 @@ fn compare(model: &LinkModel, then: &[(usize, &LinkModel)], (instants, until): (
             whole.set_model(*now, (*model).clone()).unwrap();
             stepped.set_model(*now, LinkId(0), (7, &name), (*model).clone(), &mut |at, _, number, item| arrivals.push((at, number, item)));
         }
-        whole.handle_packet(*now, info, 1000 - place).unwrap();
+        let payload = 1000 - place as u64;
+        whole.handle_packet(*now, info, payload).unwrap();
         let next = instants.get(place + 1).copied().unwrap_or(Instant::MAX);
-        stepped.offer((*now, next), LinkId(0), 1000 - place, |at, is_late, number, item| {
+        stepped.offer((*now, next), LinkId(0), payload, |at, is_late, number, item| {
             assert_eq!(is_late, arrivals.iter().any(|(other, ..)| *other >= at));
             arrivals.push((at, number, item));
         });
@@ -168,8 +170,8 @@ fn what_is_ahead_of_a_driver_that_stops_is_taken_back() {
             stepped.add(7, &name, &model);
             let mut arrivals = Vec::new();
             for (now, next) in offered[..=last].iter().zip(&offered[1..]) {
-                whole.handle_packet(*now, info, ()).unwrap();
-                stepped.offer((*now, *next), LinkId(0), (), |at, _, number: u64, ()| arrivals.push((at, usize::try_from(number).unwrap())));
+                whole.handle_packet(*now, info, 0_u64).unwrap();
+                stepped.offer((*now, *next), LinkId(0), 0_u64, |at, _, number: u64, _| arrivals.push((at, usize::try_from(number).unwrap())));
             }
             let stop = offered[last].saturating_add(Duration::from_millis(2));
             whole.handle_timeout(stop).unwrap();
@@ -231,7 +233,7 @@ fn queues_between_memories_decide_what_whole_links_decide() {
     }
 }
 
-proptest! {
+properties! {
     /// Gaps range from zero to longer than the queue, limits are of each kind, and intervals of CoDel end long before the run does or never.
     #[test]
     fn queues_decide_what_whole_links_decide(

@@ -112,6 +112,7 @@ mod tests {
     use alloc::collections::VecDeque;
     use alloc::vec::Vec;
 
+    use cohaptic_tests_common::properties;
     use proptest::prelude::*;
 
     use super::*;
@@ -154,7 +155,7 @@ mod tests {
         assert_eq!(fates, by_stage(&bottleneck, Bytes::new(0), &offered));
     }
 
-    proptest! {
+    properties! {
         /// Departures and drops equal those of the stage that keeps packets. Gaps range from zero to longer than the queue, and rates include times on the
         /// line that are rounded and times that are not.
         #[test]

@@ -7,6 +7,7 @@ mod dualpi2;
 
 use std::collections::BTreeMap;
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::Bytes;
 use cohaptic_wan::random::Purpose;
 use cohaptic_wan::{Bottleneck, DeliveryTrace, Discipline, DropCause, Framing, LinkConfig, Pie, QueueLimit, Red, Service};
@@ -403,7 +404,7 @@ fn queues() -> BoxedStrategy<Discipline> {
     prop_oneof![2 => Just(Discipline::TailDrop), 2 => Just(Discipline::HeadDrop), 1 => Just(Discipline::Pie(Pie::default()))].boxed()
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(320))]
 
     #[test]

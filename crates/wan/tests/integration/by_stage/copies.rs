@@ -1,5 +1,6 @@
 //! Stages that decide about a packet at once: largest size, copies, damage, and limit of packets.
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::Bytes;
 use cohaptic_wan::random::Purpose;
 use cohaptic_wan::{Chance, Checksum, Corruption, Delay, DropCause, Fate, Flips, LinkConfig};
@@ -87,7 +88,7 @@ fn model(script: &Script<LinkConfig>) -> Vec<Said> {
     sorted(said)
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(320))]
 
     #[test]

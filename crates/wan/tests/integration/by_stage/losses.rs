@@ -1,5 +1,6 @@
 //! Every loss model, packet after packet, by its definition.
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Instant, Probability};
 use cohaptic_wan::random::Purpose;
 use cohaptic_wan::{Chance, DropCause, FourState, GilbertElliott, GilbertElliottInTime, LinkConfig, Loss, Pattern};
@@ -193,7 +194,7 @@ fn model(script: &Script<Words>) -> Vec<Said> {
     sorted(said)
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(1_000))]
 
     #[test]

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use cohaptic_wan::random::{Purpose, Stream};
 use cohaptic_wan::{Modulator, PacketEvent, PacketInfo, Sojourn};
@@ -44,7 +45,7 @@ fn path(modulator: &Modulator, until: u64) -> Vec<(u64, usize)> {
     path
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(120))]
 
     #[test]

@@ -1,5 +1,6 @@
 //! Outages: by a timetable, by random spans, and of an idle link.
 
+use cohaptic_tests_common::properties;
 use cohaptic_wan::random::Purpose;
 use cohaptic_wan::{DropCause, IdleOutages, LinkConfig, Outages, RandomOutages, Sojourn};
 use proptest::prelude::*;
@@ -72,7 +73,7 @@ fn model(script: &Script<Outages>) -> Vec<Said> {
     sorted(said)
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(240))]
 
     #[test]

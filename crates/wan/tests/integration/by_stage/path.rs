@@ -2,6 +2,7 @@
 
 use std::sync::LazyLock;
 
+use cohaptic_tests_common::properties;
 use cohaptic_wan::random::Purpose;
 use cohaptic_wan::{Between, Correlation, Delay, Distribution, DropCause, LinkConfig, Order, PathTrace, standard_normal};
 use proptest::prelude::*;
@@ -157,7 +158,7 @@ fn alike(subject: &[Said], model: &[Said]) -> bool {
     subject.len() == model.len() && subject.iter().zip(model).all(|(a, b)| near(a, b))
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(240))]
 
     #[test]

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use cohaptic_tests_common::properties;
 use cohaptic_wan::random::Purpose;
 use cohaptic_wan::{Delay, Displacement, LinkConfig, Reorder};
 use proptest::prelude::*;
@@ -89,7 +90,7 @@ fn model(script: &Script<Config>) -> Vec<Said> {
     sorted(said)
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(320))]
 
     #[test]

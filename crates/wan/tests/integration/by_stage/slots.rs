@@ -1,5 +1,6 @@
 //! Slots: waiting packets leave when a slot opens, as many as the slot takes.
 
+use cohaptic_tests_common::properties;
 use cohaptic_wan::random::Purpose;
 use cohaptic_wan::{LinkConfig, SlotGap, Slots};
 use proptest::prelude::*;
@@ -51,7 +52,7 @@ fn model(script: &Script<Slots>) -> Vec<Said> {
     sorted(said)
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(320))]
 
     #[test]

@@ -1,5 +1,6 @@
 //! Token bucket, against a model that adds tokens span by span and serves the queue from its head.
 
+use cohaptic_tests_common::properties;
 use cohaptic_wan::{DropCause, LinkConfig, QueueLimit, TokenBucket};
 use proptest::prelude::*;
 
@@ -121,7 +122,7 @@ fn model(script: &Script<TokenBucket>) -> Vec<Said> {
     sorted(said)
 }
 
-proptest! {
+properties! {
     #![proptest_config(cases(1_000))]
 
     #[test]

@@ -3,6 +3,7 @@ mod formats;
 mod frames;
 mod people;
 
+use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{Fate, PacketRecord};
 use proptest::prelude::*;
@@ -109,7 +110,7 @@ fn a_frame_larger_than_the_buffer_is_read() {
     assert_eq!(between(file.as_slice(), file.as_slice(), None).unwrap().measurements.packets().len(), 3);
 }
 
-proptest! {
+properties! {
     #[test]
     fn damaged_captures_never_panic(edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8), cut in any::<prop::sample::Index>()) {
         let good = capture(&[(0, 0, b"abc"), (1, 10, b"defgh"), (2, 20, b"")]);

@@ -1,5 +1,6 @@
 //! Any edit of a file is answered.
 
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 use serde_json::json;
 
@@ -31,7 +32,7 @@ fn letters() -> impl Strategy<Value = char> {
     prop_oneof![any::<char>(), prop::sample::select("0159-.e,[]{}\":= \n".chars().collect::<Vec<_>>())]
 }
 
-proptest! {
+properties! {
     /// Any edit of any file is answered. What is read has finite delays in the order of sending, and texts of links are TOML.
     #[test]
     fn edited_files_never_panic(

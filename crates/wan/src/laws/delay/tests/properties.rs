@@ -1,3 +1,4 @@
+use cohaptic_tests_common::properties;
 use proptest::prelude::*;
 
 use super::*;
@@ -24,7 +25,7 @@ fn size() -> impl Strategy<Value = f64> {
     (-6.0..9.0_f64).prop_map(libm::exp10)
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// An accepted law is monotone, finite and not below its floor. Any other law is refused with a stated reason.

@@ -4,6 +4,7 @@
 use core::num::NonZeroU32;
 use core::time::Duration;
 
+use cohaptic_tests_common::properties;
 use proptest::option::of;
 use proptest::prelude::*;
 
@@ -188,7 +189,7 @@ fn drain(qdisc: &mut Qdisc<u64>, naive: &mut Naive, now: u64) -> Result<(u64, u6
     Ok((left, now))
 }
 
-proptest! {
+properties! {
     #[test]
     fn the_queue_does_what_a_sorted_vector_does(netem in netem(), operations in operations(), seed in any::<u64>()) {
         let mut qdisc = Qdisc::new(&netem, seed, |_| None).unwrap();
