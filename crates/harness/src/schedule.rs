@@ -1,7 +1,5 @@
 //! Schedule of the ticks of peers.
 
-use std::time::Duration;
-
 use cohaptic_peer::Clock;
 use cohaptic_units::Instant;
 use cohaptic_wan::{Event, EventQueue};
@@ -11,8 +9,8 @@ use crate::plan::Ticking;
 /// Instants of the scene at which peers tick.
 #[derive(Clone, Debug)]
 pub(crate) enum Schedule {
-    /// All peers tick together, every `tick`, next at `next`.
-    Lockstep { tick: Duration, next: Instant },
+    /// All peers tick together, every `nanos` nanoseconds, next at `next`.
+    Lockstep { nanos: u64, next: Instant },
     /// An event for the next tick of each peer.
     EventDriven(Box<EventQueue<Tick>>),
 }
@@ -42,9 +40,9 @@ impl Schedule {
         let mut clocks = clocks.into_iter();
         match ticking {
             Ticking::Lockstep => {
-                // In lockstep all clocks are equal, so the clock of the first peer is enough.
-                let tick = clocks.next().map_or(Duration::MAX, |(_, clock)| clock.tick);
-                Self::Lockstep { tick, next: Instant::ZERO }
+                // In lockstep all clocks are equal, so the clock of the first peer is enough. No run is as long as the longest tick of 64 bits.
+                let nanos = clocks.next().and_then(|(_, clock)| u64::try_from(clock.tick.as_nanos()).ok()).unwrap_or(u64::MAX);
+                Self::Lockstep { nanos, next: Instant::ZERO }
             }
             Ticking::EventDriven => {
                 let mut queue = EventQueue::new();

@@ -63,6 +63,8 @@ pub struct Peer<const A: usize, D, S> {
     strategy: S,
     /// Answers of the strategy that were asked once, in [`Peer::new`].
     asked: Asked,
+    /// `true` if a tick has none of its optional parts: see [`Peer::is_without_parts`].
+    is_plain: bool,
     held: Held<A>,
     /// Sum of the displacements of each sender. The positions in `held` are these sums. `None` for a peer without sums. Boxed, because only a server of clients
     /// that send displacements has sums.
@@ -143,12 +145,13 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         let exchanged = (config.exchange != Exchange::EACH_TICK).then(|| Box::new(Exchanged::new(device.state())));
         let tick_nanos = u64::try_from(config.tick.as_nanos()).unwrap_or(u64::MAX);
         let (computed, applied) = (none, none);
-        Self {
+        let mut peer = Self {
             config,
             device,
             object,
             strategy,
             asked,
+            is_plain: false,
             held,
             increments,
             rotation,
@@ -159,7 +162,17 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
             tick_nanos,
             computed,
             applied,
-        }
+        };
+        peer.is_plain = peer.is_without_parts();
+        peer
+    }
+
+    /// Returns whether a tick of this peer has none of the parts that few peers have: walls, a compute delay, exchanges with a slow device, a rotation, and what
+    /// a strategy asks for beyond the mean of the samples.
+    fn is_without_parts(&self) -> bool {
+        let PeerConfig { enclosure, compute_delay, .. } = &self.config;
+        let Asked { prediction, any, .. } = self.asked;
+        !(any || prediction || *compute_delay || enclosure.is_some() || self.exchanged.is_some() || self.rotation.is_some())
     }
 
     /// Adds a rotating copy. The samples of such a peer carry attitudes, so its strategy must be a law without extra numbers. Torques have no exchanges, so the
@@ -170,6 +183,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         debug_assert!(self.exchanged.is_none(), "torques act at each tick");
         self.rotation = Some(Box::new(rotation));
         (self.asked.kind, self.asked.any) = (SampleKind::Attitude, true);
+        self.is_plain = self.is_without_parts();
         self
     }
 
@@ -247,21 +261,36 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// Step 3: computes the forces of this tick. The next tick follows after `span`.
     #[inline(always)]
     pub fn compute_over(&mut self, now: Instant, span: Duration) -> Forces<A> {
+        // One test takes the place of a test for each optional part, which most peers do not have (`benches/peers`, rows of watched packets).
+        if self.is_plain { self.compute_as::<true>(now, span) } else { self.compute_with_parts(now, span) }
+    }
+
+    /// Computes the forces of a tick with optional parts. Not inlined, so that the frequent case stays small.
+    #[inline(never)]
+    fn compute_with_parts(&mut self, now: Instant, span: Duration) -> Forces<A> {
+        self.compute_as::<false>(now, span)
+    }
+
+    /// Computes the forces of a tick. With `PLAIN` the peer has no optional part, so that the compiler leaves out the tests of the parts.
+    #[inline(always)]
+    fn compute_as<const PLAIN: bool>(&mut self, now: Instant, span: Duration) -> Forces<A> {
         // One mean for all samples of a tick: several samples may arrive between two ticks.
         if self.stale_mean {
             self.held.refresh();
             self.stale_mean = false;
         }
-        if let Some(exchanged) = &mut self.exchanged {
+        let mut exchanged = self.exchanged.as_mut().filter(|_| !PLAIN);
+        if let Some(exchanged) = &mut exchanged {
             exchanged.read(self.config.exchange, self.device.state());
         }
+        let reading = exchanged.as_ref().map_or_else(|| self.device.state(), |exchanged| exchanged.reading);
         // Before the copy is read: a client takes its copy from the newest sample of the server.
-        let heard = if self.asked.any { self.heard() } else { None };
+        let heard = if !PLAIN && self.asked.any { self.heard() } else { None };
         let own = self.object.state();
-        let coupling = heard.unwrap_or_else(|| self.coupling_force(own));
-        let walls = self.config.enclosure.as_ref().map(|enclosure| enclosure.force(own));
+        let coupling = heard.unwrap_or_else(|| self.coupling_force(&reading, own));
+        let walls = self.config.enclosure.as_ref().filter(|_| !PLAIN).map(|enclosure| enclosure.force(own));
         // The prediction needs the coupling and the walls of this tick, so it follows both.
-        let ahead = if self.asked.prediction {
+        let ahead = if !PLAIN && self.asked.prediction {
             let walls = walls.unwrap_or([0.0; A]);
             self.object.ahead(span, core::array::from_fn(|axis| coupling[axis] + walls[axis]))
         } else {
@@ -276,13 +305,13 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         }
         let computed = Acting { coupling, on_object };
         // With a compute delay the forces of the tick before act now, and the new forces wait one tick.
-        if self.config.compute_delay {
+        if !PLAIN && self.config.compute_delay {
             self.applied = core::mem::replace(&mut self.computed, computed);
         } else {
             self.applied = computed;
         }
         // The copy feels FC of each tick, because both are parts of one program; the device keeps FC of its latest exchange.
-        if let Some(exchanged) = &mut self.exchanged {
+        if let Some(exchanged) = self.exchanged.as_mut().filter(|_| !PLAIN) {
             self.applied.coupling = exchanged.hold(self.config.exchange, self.applied.coupling);
         }
         // β is part of the copy's plant and acts between ticks too; only the record adds it to FT.
@@ -411,6 +440,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     pub fn set_exchange(&mut self, exchange: Exchange) {
         self.config.exchange = exchange;
         self.exchanged = (exchange != Exchange::EACH_TICK).then(|| Box::new(Exchanged::new(self.device.state())));
+        self.is_plain = self.is_without_parts();
     }
 
     /// Replaces readings and force between two exchanges. Without effect with [`Exchange::EACH_TICK`].
@@ -491,14 +521,17 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         self.strategy.heard_coupling()
     }
 
-    #[inline]
-    fn coupling_force(&self, object: &State<A>) -> [f64; A] {
-        let PeerConfig { contact, coupling, .. } = self.config;
-        // The force is zero on every axis, whatever the state of the device is.
-        if contact == Contact::None {
-            return [0.0; A];
+    /// Returns FC \[N\] for a reading of the device and the state of the copy.
+    #[inline(always)]
+    fn coupling_force(&self, device: &State<A>, object: &State<A>) -> [f64; A] {
+        let PeerConfig { contact, coupling, .. } = &self.config;
+        let force = |contact: Contact, axis| contact.force_along(axis, coupling, device.along(axis).relative_to(object.along(axis)));
+        match contact {
+            // A constant contact, so that the compiler leaves out the other contacts where the force is computed.
+            Contact::Grasp => core::array::from_fn(|axis| force(Contact::Grasp, axis)),
+            // The force is zero on every axis, whatever the state of the device is.
+            Contact::None => [0.0; A],
+            Contact::Push(_) => core::array::from_fn(|axis| force(*contact, axis)),
         }
-        let device = self.exchanged.as_ref().map_or_else(|| self.device.state(), |exchanged| exchanged.reading);
-        core::array::from_fn(|axis| contact.force_along(axis, &coupling, device.along(axis).relative_to(object.along(axis))))
     }
 }

@@ -9,8 +9,10 @@ use crate::{Clock, Integrator, Plant, State, StepMap};
 pub(crate) struct Stepper {
     plant: Plant,
     integrator: Integrator,
-    short: (Duration, StepMap),
-    long: (Duration, StepMap),
+    /// Shorter span \[ns\] and its map. Spans are whole numbers, because a comparison of two [`Duration`] compares seconds and nanoseconds.
+    short: (u64, StepMap),
+    /// Longer span \[ns\] and its map.
+    long: (u64, StepMap),
     /// `true` if no spring ties the body to ground, so that [`StepMap::advance_free`] applies.
     free: bool,
 }
@@ -19,7 +21,7 @@ impl Stepper {
     /// Returns the stepper of a plant, with the maps of both spans of `clock`.
     pub(crate) fn new(plant: Plant, integrator: Integrator, clock: &Clock) -> Self {
         let (short, long) = clock.spans();
-        let step = |span| (span, plant.step(span, integrator));
+        let step = |span| (nanos(span), plant.step(span, integrator));
         let (short, long) = (step(short), step(long));
         Self { plant, integrator, short, long, free: short.1.is_free() && long.1.is_free() }
     }
@@ -28,38 +30,35 @@ impl Stepper {
     pub(crate) fn set_damping(&mut self, damping: f64) {
         self.plant.damping = damping;
         for (span, map) in [&mut self.short, &mut self.long] {
-            *map = self.plant.step(*span, self.integrator);
+            *map = self.plant.step(Duration::from_nanos(*span), self.integrator);
         }
         self.free = self.short.1.is_free() && self.long.1.is_free();
     }
 
     /// Returns the map of a step over `span`.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn map(&self, span: Duration) -> StepMap {
-        if span == self.short.0 {
-            self.short.1
-        } else if span == self.long.0 {
-            self.long.1
-        } else {
+        [&self.short, &self.long]
+            .into_iter()
+            .find(|known| known.0 == nanos(span))
             // A span of another clock: the driver that passes it pays for a new map at each call.
-            self.plant.step(span, self.integrator)
-        }
+            .map_or_else(|| self.plant.step(span, self.integrator), |known| known.1)
     }
 
     /// Moves the body over `span` under the held force.
     #[inline(always)]
     pub(crate) fn advance<const A: usize>(&self, state: &mut State<A>, span: Duration, force: [f64; A]) {
-        // A borrowed map: `Stepper::map` would copy its coefficients at each tick.
-        let other;
-        let map = if span == self.short.0 {
-            &self.short.1
-        } else if span == self.long.0 {
-            &self.long.1
-        } else {
-            // A span of another clock: the driver that passes it pays for a new map at each call.
-            other = self.plant.step(span, self.integrator);
-            &other
-        };
+        // The only span of a clock without drift. Its map is borrowed, and the other maps are chosen elsewhere: a choice would copy a map at each tick.
+        if nanos(span) == self.short.0 { self.advance_by(&self.short.1, state, force) } else { self.advance_otherwise(state, span, force) }
+    }
+
+    #[inline(never)]
+    fn advance_otherwise<const A: usize>(&self, state: &mut State<A>, span: Duration, force: [f64; A]) {
+        self.advance_by(&self.map(span), state, force);
+    }
+
+    #[inline(always)]
+    fn advance_by<const A: usize>(&self, map: &StepMap, state: &mut State<A>, force: [f64; A]) {
         for (axis, force) in force.into_iter().enumerate() {
             let mut body = state.along(axis);
             // The terms of the position are zero for a free body. The branch is the same at every tick.
@@ -71,4 +70,10 @@ impl Stepper {
             state.set_along(axis, body);
         }
     }
+}
+
+/// Returns a span \[ns\]. A span of more than 584 years, which no two instants have between them, counts as the longest.
+#[inline(always)]
+fn nanos(span: Duration) -> u64 {
+    u64::try_from(span.as_nanos()).unwrap_or(u64::MAX)
 }

@@ -189,11 +189,22 @@ impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Memb
 
     #[inline]
     pub(super) fn is_finite(&self) -> bool {
+        !self.times_zero().is_nan() && self.turns_finitely()
+    }
+
+    /// Returns whether the attitudes of the peer are finite; `true` without a rotation.
+    pub(super) fn turns_finitely(&self) -> bool {
+        self.peer.rotation().is_none_or(Rotation::is_finite)
+    }
+
+    /// Returns the sum of [`State::times_zero`] of copy and device.
+    #[inline]
+    pub(super) fn times_zero(&self) -> f64 {
         // One match arm for each kind, not a reference chosen by the match: each arm then reads a known address.
         let device = match self.peer.device() {
-            DeviceModel::Unsimulated(device) => device.state().is_finite(),
-            DeviceModel::Simulated(device) => device.state().is_finite(),
+            DeviceModel::Unsimulated(device) => device.state().times_zero(),
+            DeviceModel::Simulated(device) => device.state().times_zero(),
         };
-        self.peer.object().state().is_finite() & device & self.peer.rotation().is_none_or(Rotation::is_finite)
+        self.peer.object().state().times_zero() + device
     }
 }

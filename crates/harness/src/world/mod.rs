@@ -330,9 +330,9 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     fn compute_and_move(&mut self, now: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<(), Ended> {
         // In lockstep all ticks have the same length and no queue of ticks is needed.
         let lockstep = match &mut self.schedule {
-            Schedule::Lockstep { tick, next } => {
-                *next = now.saturating_add(*tick);
-                Some(*tick)
+            Schedule::Lockstep { nanos, next } => {
+                *next = now.saturating_add_nanos(*nanos);
+                Some(Duration::from_nanos(*nanos))
             }
             Schedule::EventDriven(_) => None,
         };
@@ -401,16 +401,17 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 *latest = *rotation.copy();
             }
         }
-        let mut finite = true;
+        // One test of a sum of zeros shows whether all states are finite.
+        let mut zero = 0.0_f64;
         for (member, latest) in self.members.iter_mut().zip(&mut self.latest) {
             member.peer.compute_over(now, span);
             // Taken before the motion: the latest position is that of the tick, as in the general loop.
             *latest = member.peer.object().state().position;
             member.tick += 1;
             member.peer.advance(now, span);
-            finite &= member.is_finite();
+            zero += member.times_zero();
         }
-        self.finite &= finite;
+        self.finite &= !zero.is_nan() && (self.turning.is_none() || self.members.iter().all(Member::turns_finitely));
     }
 
     /// Returns the largest distance along an axis between two copies at their latest ticks \[m\]. Copies of absent peers are left out.

@@ -163,7 +163,11 @@ macro_rules! registry {
                 // registers than there are (`benches/peers`, rows of watched packets).
                 match self {
                     Self::Law(law) if law.is_of_the_present() => law.at_once(context),
-                    Self::Law(_) $(| Self::$controller(_))+ => self.command_apart(context),
+                    // Copies of the context and of the command: without them, the context is written to memory for `at_once` too.
+                    Self::Law(_) $(| Self::$controller(_))+ => {
+                        let Command { force, target } = self.command_apart(&Context { ..*context });
+                        Command { force, target }
+                    }
                 }
             }
 

@@ -4,13 +4,17 @@ use std::time::Duration;
 
 use cohaptic_peer::{
     Clock, Contact, Coordination, CopyConfig, Device as _, DeviceConfig, Exchange, Gains, Hand, Held, Integrator, ObjectCopy, Peer, PeerConfig,
-    Signal, SimulatedDevice, State,
+    Signal, SimulatedDevice, State, coordination::LawStrategy,
 };
 
 const TICK: Duration = Duration::from_millis(1);
 
 /// Returns device and copy (xH, vH, xO, vO) after 100 ticks of 1 ms under a hand of 1.5 N: half of 0.45 kg drawn to another copy at rest at 0.
 fn after_100_ticks(coupling: Gains, exchange: Exchange) -> [f64; 4] {
+    after_100_ticks_of(peer(coupling, exchange))
+}
+
+fn peer(coupling: Gains, exchange: Exchange) -> Peer<1, SimulatedDevice<1>, LawStrategy<1>> {
     let clock = Clock::regular(TICK);
     let config = PeerConfig {
         session: 0,
@@ -28,9 +32,12 @@ fn after_100_ticks(coupling: Gains, exchange: Exchange) -> [f64; 4] {
     let device = SimulatedDevice::new(DeviceConfig { mass: 0.1, damping: 5.0 }, Some(&hand), State::REST, Integrator::Exact, &clock);
     let object = ObjectCopy::new(CopyConfig { mass: 0.225, damping: 0.0 }, State::REST, Integrator::Exact, &clock);
     let law = Coordination::AveragePosition.strategy(Gains { stiffness: 500.0, damping: 5.0 }, 2, TICK);
-    let mut peer = Peer::<1, _, _>::new(config, device, object, law, Held::new([State::REST]));
+    Peer::new(config, device, object, law, Held::new([State::REST]))
+}
+
+fn after_100_ticks_of(mut peer: Peer<1, SimulatedDevice<1>, LawStrategy<1>>) -> [f64; 4] {
     for tick in 0..100 {
-        let now = clock.instant(tick).expect("a tenth of a second can be counted");
+        let now = Clock::regular(TICK).instant(tick).expect("a tenth of a second can be counted");
         peer.compute(now);
         peer.advance(now, TICK);
     }
@@ -63,5 +70,17 @@ fn a_device_without_a_pace_exchanges_at_each_tick() {
     for late in [false, true] {
         let [zero, one] = [0, 1].map(|every| after_100_ticks(coupling, Exchange { every, late }));
         assert_eq!(zero.map(f64::to_bits), one.map(f64::to_bits), "late: {late}");
+    }
+}
+
+/// A pace that is set takes the place of the pace with which the peer was made, in both directions.
+#[test]
+fn a_pace_that_is_set_is_the_pace_of_all_later_ticks() {
+    let coupling = Gains { stiffness: 1000.0, damping: 2.0 };
+    let slow = Exchange { every: 2, late: true };
+    for (made, set) in [(Exchange::EACH_TICK, slow), (slow, Exchange::EACH_TICK)] {
+        let mut peer = peer(coupling, made);
+        peer.set_exchange(set);
+        assert_eq!(after_100_ticks_of(peer).map(f64::to_bits), after_100_ticks(coupling, set).map(f64::to_bits), "{made:?}, then {set:?}");
     }
 }
