@@ -23,14 +23,16 @@
 //! A short calendar has no buckets: all events lie in the front, and a new event is inserted there. With few events in all, a bucket holds hardly
 //! any, and finding and emptying the bucket takes longer than the insertion.
 
+mod front;
 mod slab;
 
-use alloc::collections::{BinaryHeap, VecDeque};
+use alloc::collections::BinaryHeap;
 use alloc::vec::Vec;
 use core::cmp::Reverse;
 
 use cohaptic_units::Instant;
 
+use front::Front;
 use slab::Slab;
 
 use crate::ring::Ring;
@@ -57,7 +59,7 @@ pub struct EventQueue<E> {
     /// Events of the calendar. Each event keeps its index until its removal.
     slab: Slab<E>,
     /// Events in order, with the next events to take: the events of the current bucket, and events pushed later into this bucket or an earlier bucket.
-    front: VecDeque<Entry>,
+    front: Front,
     /// `true` if all events of the calendar lie in `front`, whatever their buckets. Becomes `false` when the calendar has more than [`SHORT`] events, and stays
     /// so until the queue is a ring again.
     is_short: bool,
@@ -115,7 +117,7 @@ impl<E: Event> EventQueue<E> {
             ordered: Ring::new(),
             in_order: true,
             slab: Slab::new(),
-            front: VecDeque::new(),
+            front: Front::default(),
             is_short: false,
             current: 0,
             ring: Vec::new(),
@@ -155,19 +157,12 @@ impl<E: Event> EventQueue<E> {
         self.push_calendar(event);
     }
 
-    /// Returns the event pushed last, or `None` if the queue is empty or a calendar.
-    #[inline(always)]
-    pub(crate) fn last_in_order(&self) -> Option<&E> {
-        // `ordered` is empty in a calendar.
-        self.ordered.back()
-    }
-
     /// Adds an event at the instant `at`. `make` constructs the event in its final place, so no large value is moved. `follows` tells whether the key of
-    /// the event is at least the key of [`EventQueue::last_in_order`].
+    /// the event is at least the key of another event.
     #[inline(always)]
-    pub(crate) fn push_made(&mut self, at: Instant, follows: bool, make: impl FnOnce() -> E) {
+    pub(crate) fn push_made(&mut self, at: Instant, follows: impl FnOnce(&E) -> bool, make: impl FnOnce() -> E) {
         if self.in_order {
-            if follows {
+            if self.ordered.back().is_none_or(follows) {
                 return self.ordered.push(make);
             }
             self.become_calendar();
@@ -189,7 +184,7 @@ impl<E: Event> EventQueue<E> {
         if !self.is_due(now) {
             return None;
         }
-        let (_, place) = self.front.pop_front()?;
+        let (_, place) = self.front.pop()?;
         self.len -= 1;
         // An empty calendar becomes a ring again.
         self.in_order = self.len == 0;
@@ -207,7 +202,7 @@ impl<E: Event> EventQueue<E> {
             if !self.is_due(now) {
                 return None;
             }
-            let (_, place) = self.front.pop_front()?;
+            let (_, place) = self.front.pop()?;
             self.len -= 1;
             self.in_order = self.len == 0;
             self.slab.pass(place)
@@ -224,13 +219,13 @@ impl<E: Event> EventQueue<E> {
         if !self.is_due(now) {
             return None;
         }
-        self.front.front().and_then(|first| self.slab.key(first.1))
+        self.front.first().and_then(|first| self.slab.key(first.1))
     }
 
     /// Returns whether the front of the calendar begins with an event that is due at `now`, after a search for the next bucket if the front is empty.
     #[inline(always)]
     fn is_due(&mut self, now: Instant) -> bool {
-        match self.front.front() {
+        match self.front.first() {
             Some(first) => first.0 <= now,
             None => self.advance(now),
         }
@@ -243,7 +238,7 @@ impl<E: Event> EventQueue<E> {
             return self.ordered.front().is_some_and(|first| first.at() <= now);
         }
         // Events in `ring` and `far` come after every event of the front, so the front decides unless it is empty.
-        self.front.front().map_or(self.quiet_until <= now && self.len > 0, |first| first.0 <= now)
+        self.front.first().map_or(self.quiet_until <= now && self.len > 0, |first| first.0 <= now)
     }
 
     /// Returns the instant of the first event, or `None` for an empty queue.
@@ -253,7 +248,7 @@ impl<E: Event> EventQueue<E> {
             return self.ordered.front().map(Event::at);
         }
         // Front, ring and far hold events in this order of time, so the first event found decides.
-        if let Some(first) = self.front.front() {
+        if let Some(first) = self.front.first() {
             return Some(first.0);
         }
         let Some(bucket) = self.next_occupied() else {
@@ -288,32 +283,40 @@ impl<E: Event> EventQueue<E> {
     fn fill_buckets(&mut self) {
         self.is_short = false;
         self.ring.resize_with(RING, Vec::new);
-        let events = core::mem::take(&mut self.front);
+        let events = core::mem::take(&mut self.front).into_entries();
         // Events of the front are in order, so no event lies before the bucket of the first event.
-        self.current = events.front().map_or(0, |first| self.bucket_of(first.0));
+        self.current = events.first().map_or(0, |first| self.bucket_of(first.0));
         for entry in events {
             self.push_entry(entry);
         }
     }
 
-    #[inline]
+    /// Puts an event of the slab into the front, into a bucket, or beyond the buckets.
+    #[inline(always)]
     fn push_entry(&mut self, entry: Entry) {
+        // Later buckets stay unsorted until their time comes. A bucket before the next bucket is far beyond the ring in this difference.
+        let bucket = self.bucket_of(entry.0);
+        let beyond_next = bucket.wrapping_sub(self.current).wrapping_sub(1);
+        if self.is_short || beyond_next >= RING as u64 - 1 {
+            return self.push_elsewhere(bucket, entry);
+        }
+        self.quiet_until = self.quiet_until.min(entry.0);
+        self.push_ring(bucket, entry);
+    }
+
+    /// Puts an event into the front or beyond the buckets. Not inlined, so that a push into a bucket stays small.
+    #[inline(never)]
+    fn push_elsewhere(&mut self, bucket: u64, entry: Entry) {
         if self.is_short {
             self.push_front(entry);
             if self.len > SHORT {
                 self.fill_buckets();
             }
-            return;
-        }
-        // Past events and events of the current bucket go to the sorted front. Later buckets stay unsorted until their time comes.
-        let bucket = self.bucket_of(entry.0);
-        if bucket <= self.current {
-            return self.push_front(entry);
-        }
-        self.quiet_until = self.quiet_until.min(entry.0);
-        if bucket - self.current < RING as u64 {
-            self.push_ring(bucket, entry);
+        } else if bucket <= self.current {
+            // Past events and events of the current bucket go to the sorted front.
+            self.push_front(entry);
         } else {
+            self.quiet_until = self.quiet_until.min(entry.0);
             self.far.push(Reverse(entry));
         }
     }
@@ -336,7 +339,7 @@ impl<E: Event> EventQueue<E> {
     /// Brings the next bucket to the front if the front is empty and the bucket has begun at `now`. Returns whether the front begins with a due event.
     fn advance(&mut self, now: Instant) -> bool {
         let present = self.bucket_of(now);
-        while self.front.is_empty() && self.len > 0 {
+        while self.front.first().is_none() && self.len > 0 {
             // All events of `ring` come before all events of `far`.
             let next = self.next_occupied().or_else(|| self.far.peek().map(|Reverse(first)| self.bucket_of(first.0)));
             let Some(next) = next else { break };
@@ -347,11 +350,11 @@ impl<E: Event> EventQueue<E> {
             }
             self.bring_to_front(next);
         }
-        if self.front.is_empty() {
+        if self.front.first().is_none() {
             // No event lies in the present bucket or before, so the ring may begin here. Events pushed next then find all slots free for the time ahead.
             self.move_to(self.current.max(present));
         }
-        self.front.front().is_some_and(|first| first.0 <= now)
+        self.front.first().is_some_and(|first| first.0 <= now)
     }
 
     /// Sorts a bucket into the empty front, and makes the bucket the current bucket. If the first event is in `far`, the slot is empty, and `move_to` pulls the
@@ -403,7 +406,7 @@ impl<E: Event> EventQueue<E> {
         if !WIDTHS.contains(&width) {
             return;
         }
-        let mut entries: Vec<Entry> = core::mem::take(&mut self.front).into();
+        let mut entries = core::mem::take(&mut self.front).into_entries();
         while let Some(bucket) = self.next_occupied() {
             let place = slot(bucket);
             self.occupied[place / 64] &= !(1 << (place % 64));
@@ -434,18 +437,12 @@ impl<E: Event> EventQueue<E> {
 
     /// Inserts an entry into the front by instant and key.
     fn push_front(&mut self, entry: Entry) {
+        let Self { front, slab, .. } = self;
         // Instants differ for nearly all pairs, so keys are read from the slab only for two equal instants.
-        let precedes = |other: &Entry| other.0 < entry.0 || other.0 == entry.0 && self.slab.key(other.1) <= self.slab.key(entry.1);
-        // Events of a burst are mostly pushed in order, so the end is tried before a binary search.
-        if self.front.back().is_none_or(precedes) {
-            self.front.push_back(entry);
-        } else {
-            let place = self.front.partition_point(precedes);
-            self.front.insert(place, entry);
-        }
+        front.insert(entry, |other| other.0 < entry.0 || other.0 == entry.0 && slab.are_in_order(other.1, entry.1));
     }
 
-    #[inline]
+    #[inline(always)]
     fn push_ring(&mut self, bucket: u64, entry: Entry) {
         let packed = self.pack(entry);
         let place = slot(bucket);

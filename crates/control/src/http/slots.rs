@@ -251,13 +251,8 @@ mod tests {
         assert!(late.show(Role::Guest), "it has its slot already");
     }
 
-<<<<<<< HEAD:crates/control/src/http/slots.rs
     properties! {
         /// After any sequence of steps no role has more connections than slots, and all slots are free after the last connection.
-=======
-    properties! {
-        /// After any sequence of steps no role has more connections than places, and all places are free after the last connection.
->>>>>>> fa029d92 (tests: runners, links and engines are compiled once):crates/control/src/http/places.rs
         #[test]
         fn slots_are_counted_right(steps in prop::collection::vec((0..3_u8, 0..8_usize, any::<bool>()), 0..200)) {
             let slots = slots(3, 2, 1);

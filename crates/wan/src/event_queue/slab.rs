@@ -54,6 +54,13 @@ impl<E: Event> Slab<E> {
         self.places[place as usize].take()
     }
 
+    /// Returns whether the key of the event at index `first` is at most the key of the event at index `second`. Not inlined, because the comparison of two keys
+    /// is longer than everything around it, and rare.
+    #[inline(never)]
+    pub(super) fn are_in_order(&self, first: u32, second: u32) -> bool {
+        self.key(first) <= self.key(second)
+    }
+
     /// Returns the key of a stored event, or `None` for a free index.
     pub(super) fn key(&self, place: u32) -> Option<E::Key> {
         self.places[place as usize].as_ref().map(Event::key)

@@ -78,8 +78,8 @@ impl Direct {
             return Some(DropCause::Outage);
         }
         // Outage comes before loss, and a packet in an outage leaves the chain of losses unchanged.
-        let packet = self.draws.packet(number);
-        let is_lost = self.loss.as_mut().is_some_and(|loss| loss.loses(now, number, word, packet));
+        let draws = self.draws;
+        let is_lost = self.loss.as_mut().is_some_and(|loss| loss.loses(now, number, word, || draws.packet(number)));
         is_lost.then_some(DropCause::Loss)
     }
 
@@ -87,7 +87,8 @@ impl Direct {
     #[inline(always)]
     pub(crate) fn arrival(&mut self, leaves: Instant, number: u64, [_, word]: Words) -> Instant {
         // Order comes last: a packet may wait for an earlier packet with a longer delay.
-        let delay = self.delay.draw_nanos(leaves, word, self.draws.packet(number));
+        let draws = self.draws;
+        let delay = self.delay.draw_nanos(leaves, word, || draws.packet(number));
         self.order.arrival(leaves.saturating_add_nanos(delay))
     }
 

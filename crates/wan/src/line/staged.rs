@@ -462,7 +462,7 @@ impl<T: Clone> Staged<T> {
         let draws = self.direct.draws.copy(packet.number, packet.copy);
         let traced = self.trace.as_ref().map(|trace| trace.at(now).1);
         let by_trace = traced.is_some_and(|loss| loss.happens(draws.first(Purpose::TraceLoss)));
-        let by_model = self.direct.loss.as_mut().is_some_and(|loss| loss.loses(now, packet.number, draws.first(Purpose::Loss), draws));
+        let by_model = self.direct.loss.as_mut().is_some_and(|loss| loss.loses(now, packet.number, draws.first(Purpose::Loss), || draws));
         let by_listed = self.listed.as_mut().is_some_and(|listed| listed.loses(now, packet.info));
         // All three models have advanced above: a short circuit would leave one of them behind.
         by_model || by_trace || by_listed
@@ -494,7 +494,7 @@ impl<T: Clone> Staged<T> {
             // Words have addresses, so an unread word can be skipped without an effect on further words.
             let word = if self.direct.delay.is_random() { draws.first(Purpose::Jitter) } else { 0 };
             let listed = self.listed.as_mut().map_or(0, |listed| listed.delay_nanos(now, packet.info));
-            self.direct.delay.draw_nanos(now, word, draws).saturating_add(traced).saturating_add(listed)
+            self.direct.delay.draw_nanos(now, word, || draws).saturating_add(traced).saturating_add(listed)
         };
         let wanted = match travel {
             Travel::InOrder => now.saturating_add_nanos(delay()),

@@ -13,8 +13,8 @@ use crate::line::Line;
 use crate::line::pipeline::Outcome;
 use crate::packet::PacketInfo;
 
-/// Number of receivers of a packet with random words drawn at once.
-const DRAWN_AT_ONCE: u16 = 8;
+/// Number of links to which a packet of a broadcast is offered before the arrivals are scheduled.
+const OFFERED_AT_ONCE: u16 = 8;
 
 /// Links from one node to all nodes, in the order of receivers.
 type Row<P> = [Line<P, InNetwork<P>>];
@@ -137,31 +137,44 @@ fn schedule_groups<P: Clone>(row: &mut Row<P>, first: LinkId, traffic: &mut Traf
 }
 
 /// Like [`schedule_groups`], for links of which some draw random numbers, so that each packet arrives at an instant of its own.
-///
-/// A function without a call that could change the network: the compiler then keeps in registers what is the same for all receivers (`benches/peers`, rows of
-/// watched packets).
 #[inline(never)]
 fn schedule_each<P: Clone>(row: &mut Row<P>, first: LinkId, traffic: &mut Traffic<P>, sent: &Sent<'_, P>, mut begin: u16) -> Option<Unusual> {
-    // Arrival of the packet before in this row. Its link has a lower number, so that a packet with an equal arrival follows it.
-    let mut before = None;
-    for lines in row[usize::from(begin)..].chunks_mut(usize::from(DRAWN_AT_ONCE)) {
-        // Draws for some receivers come before any other work. The draws do not depend on each other, so a processor can compute several at once.
-        let mut words = [[0; 2]; DRAWN_AT_ONCE as usize];
-        // The link from the node to itself has words as well, so words and links stay in step.
-        for (words, line) in words.iter_mut().zip(&*lines) {
-            *words = line.words();
+    for lines in row[usize::from(begin)..].chunks_mut(usize::from(OFFERED_AT_ONCE)) {
+        let (arrivals, unusual) = offer_to_some(lines, sent, begin);
+        for ((line, at), to) in lines.iter().zip(&arrivals).zip((begin..).map(NodeId)).filter(|((_, at), _)| **at > sent.now) {
+            // The latest packet of the link was offered just now.
+            traffic.schedule(*at, link_to(first, to), sent.packet(to, line.offered() - 1));
         }
-        for ((line, words), to) in lines.iter_mut().zip(&words).zip((begin..).map(NodeId)).filter(|(_, to)| *to != sent.from) {
-            let sequence = line.offered();
-            match line.offer(sent.now, Some(*words)) {
-                Outcome::Arrives(at) if at > sent.now => {
-                    traffic.schedule_after(before, at, link_to(first, to), sent.packet(to, sequence));
-                    before = Some(at);
-                }
-                outcome @ (Outcome::Arrives(_) | Outcome::Dropped(_) | Outcome::Enters) => return Some(Unusual { to, sequence, outcome }),
-            }
+        if unusual.is_some() {
+            return unusual;
         }
-        begin += DRAWN_AT_ONCE;
+        begin += OFFERED_AT_ONCE;
     }
     None
+}
+
+/// Offers a packet to each of at most [`OFFERED_AT_ONCE`] links to the receivers from `begin` on, up to the first packet that does not arrive later. Returns the
+/// arrivals, indexed like the links, or [`Instant::ZERO`] for a link without a later arrival, and the packet that ended the offers.
+///
+/// Draws, offers and events are three loops, because one loop for all needs more registers than there are (`benches/peers`, rows of watched packets).
+#[inline(always)]
+fn offer_to_some<P: Clone>(lines: &mut Row<P>, sent: &Sent<'_, P>, begin: u16) -> ([Instant; OFFERED_AT_ONCE as usize], Option<Unusual>) {
+    // The draws do not depend on each other, so a processor can compute several at once. The link from the node to itself has words as well, so words and links
+    // stay in step.
+    let mut words = [[0; 2]; OFFERED_AT_ONCE as usize];
+    for (words, line) in words.iter_mut().zip(&*lines) {
+        *words = line.words();
+    }
+    let mut arrivals = [Instant::ZERO; OFFERED_AT_ONCE as usize];
+    for (((line, words), arrival), to) in lines.iter_mut().zip(&words).zip(&mut arrivals).zip((begin..).map(NodeId)) {
+        if to == sent.from {
+            continue;
+        }
+        let sequence = line.offered();
+        match line.offer(sent.now, Some(*words)) {
+            Outcome::Arrives(at) if at > sent.now => *arrival = at,
+            outcome @ (Outcome::Arrives(_) | Outcome::Dropped(_) | Outcome::Enters) => return (arrivals, Some(Unusual { to, sequence, outcome })),
+        }
+    }
+    (arrivals, None)
 }

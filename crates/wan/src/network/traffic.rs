@@ -69,13 +69,6 @@ impl<P: Clone> Traffic<P> {
     /// Lets a packet leave `line` at `at`: the packet propagates until then.
     #[inline(always)]
     pub(super) fn schedule(&mut self, at: Instant, line: LineId, packet: InNetwork<P>) {
-        self.schedule_after(None, at, line, packet);
-    }
-
-    /// Lets a packet leave `line` at `at`, like [`Traffic::schedule`]. `before` is the arrival of the latest scheduled packet, if it is known to leave a line
-    /// of the same kind with a lower number.
-    #[inline(always)]
-    pub(super) fn schedule_after(&mut self, before: Option<Instant>, at: Instant, line: LineId, packet: InNetwork<P>) {
         let InNetwork { sequence, offered, entered, path, size, payload } = packet;
         if let Some(awaited) = &mut self.awaited {
             // After a relay the packet goes to every receiver of its sender, so any awaited node may be concerned.
@@ -84,15 +77,15 @@ impl<P: Clone> Traffic<P> {
         let turn = Turn::arrival(line);
         // `Pending::key` orders the events. Instants and turns differ for nearly all pairs, so the whole key is compared only when both are
         // equal.
-        let follows = before.map_or_else(
-            || match self.pending.last_in_order() {
-                None => true,
-                Some(last) if last.at != at => last.at < at,
-                Some(last) if last.turn != turn => last.turn < turn,
-                Some(last) => last.key() <= (at, turn, sequence, path, size.copy()),
-            },
-            |before| before <= at,
-        );
+        let follows = |last: &Pending<P>| {
+            if last.at != at {
+                last.at < at
+            } else if last.turn != turn {
+                last.turn < turn
+            } else {
+                last.key() <= (at, turn, sequence, path, size.copy())
+            }
+        };
         self.pending.push_made(at, follows, || Pending { at, sequence, offered, entered, turn, path, size, payload: Some(payload) });
     }
 

@@ -178,7 +178,7 @@ impl<T> SlotStage<T> {
                 let beyond = (unit(word) * (*max - *min).as_nanos() as f64) as u64;
                 min.saturating_add(Duration::from_nanos(beyond))
             }
-            (SlotGap::Drawn(_), Some(law)) => Duration::from_nanos(law.draw_nanos_for(Purpose::Slot, now, word, draws)),
+            (SlotGap::Drawn(_), Some(law)) => Duration::from_nanos(law.draw_nanos_for(Purpose::Slot, now, word, || draws)),
             // Cannot occur: `new` and `reconfigure` make a law for every drawn gap.
             (SlotGap::Drawn(delay), None) => delay.mean(),
         };

@@ -127,7 +127,7 @@ impl Kind {
                     Line::Free(nanos) => now.saturating_add_nanos(nanos),
                     Line::Queued(_) => unreachable!("it remembers when the packet before left"),
                 };
-                let delay = if delay == Law::UNKNOWN { stage.draw_nanos(leaves, jitter_word, packet) } else { delay };
+                let delay = if delay == Law::UNKNOWN { stage.draw_nanos(leaves, jitter_word, || packet) } else { delay };
                 Verdict::Arrives(leaves.saturating_add_nanos(delay))
             }
             (_, Delays::Correlated(_)) => unreachable!("it remembers the delay before"),
@@ -200,7 +200,7 @@ impl Kind {
     #[inline(always)]
     pub(super) fn arrival(&mut self, leaves: Instant, link: &mut Remembered, [_, word]: Words, packet: PacketDraws) -> Instant {
         leaves.saturating_add_nanos(match &mut self.delay {
-            Delays::Independent(delay) => delay.draw_nanos(leaves, word, packet),
+            Delays::Independent(delay) => delay.draw_nanos(leaves, word, || packet),
             Delays::Correlated(delays) => delays.draw_nanos(leaves, (&mut link.normal, &mut link.at), word, packet),
         })
     }

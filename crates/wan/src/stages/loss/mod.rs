@@ -145,12 +145,13 @@ impl LossStage {
         Some(Self::WithMemory(Box::new(stage)))
     }
 
-    /// Returns whether the packet `number` is lost. `word` is the packet's first random word for loss.
-    #[inline]
-    pub(crate) fn loses(&mut self, now: Instant, number: u64, word: u64, packet: PacketDraws) -> bool {
+    /// Returns whether the packet `number` is lost. `word` is the packet's first random word for loss, and `packet` makes the packet's draws where `word` is not
+    /// enough.
+    #[inline(always)]
+    pub(crate) fn loses(&mut self, now: Instant, number: u64, word: u64, packet: impl FnOnce() -> PacketDraws) -> bool {
         match self {
             Self::Independent(probability) => probability.happens(word),
-            Self::WithMemory(stage) => stage.loses(now, number, word, packet),
+            Self::WithMemory(stage) => stage.loses(now, number, word, packet()),
         }
     }
 }
