@@ -50,6 +50,8 @@ impl<P: Clone> Network<P> {
         let model = on_demand.model(path);
         on_demand.made(link, place);
         self.is_random |= model.is_random();
+        // The link may bring inner events.
+        self.settle(self.now);
         let line = self.line(&name, model);
         self.lines.links.push(line);
         // The list of path counters has one entry per link, in the order of the links.

@@ -410,6 +410,9 @@ impl<P: Clone> Network<P> {
                 return Some(event);
             }
         }
+        if let Some(event) = self.traffic.dropped.pop_front() {
+            return Some(event);
+        }
         // Everything due has happened, so the awaited instants up to now are over.
         if let Some(awaited) = &mut self.traffic.awaited {
             awaited.pass(self.now);
@@ -448,6 +451,7 @@ impl<P: Clone> Network<P> {
         self.let_pass(now)?;
         let (link, _) = self.link_and_place(path);
         let model = model.into();
+        self.settle(now);
         // A link may leave the direct way, so the network looks for inner events from now on.
         self.has_inner_events |= !model.is_direct();
         self.is_random |= model.is_random();

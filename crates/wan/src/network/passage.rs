@@ -8,7 +8,7 @@ use cohaptic_units::Instant;
 use super::Network;
 use super::id::Path;
 use super::pending::{InNetwork, LineId, Pending, SizeAndMarks};
-use super::traffic::Exits;
+use super::traffic::{Exits, Traffic};
 use crate::fates::fate::{DropCause, Fate};
 use crate::fates::record::PacketEvent;
 use crate::line::Line;
@@ -34,6 +34,16 @@ impl<P: Clone> Network<P> {
     #[inline(always)]
     pub(super) fn settle(&mut self, now: Instant) {
         if !self.has_inner_events && self.traffic.may_be_due(now) {
+            self.settle_all(now);
+        }
+    }
+
+    #[inline(never)]
+    fn settle_all(&mut self, now: Instant) {
+        self.let_happen(now);
+        // Arrivals later than a dropped packet come after the packet.
+        while let Some(dropped) = self.traffic.dropped.pop_front() {
+            self.traffic.happened.push_back(dropped);
             self.let_happen(now);
         }
     }
@@ -181,8 +191,10 @@ impl<P: Clone> Network<P> {
     #[inline(never)]
     pub(super) fn drop(&mut self, now: Instant, line: LineId, cause: DropCause, packet: InNetwork<P>) {
         self.lines.get_mut(line).drop(cause);
-        self.settle(now);
         let event = self.traffic.event(line, packet, now, Fate::Dropped(cause));
-        self.traffic.happened.push_back(event);
+        // With inner events, everything due by `now` has happened at the offer. Without, arrivals that are due wait for the poll.
+        let Traffic { happened, dropped, .. } = &mut self.traffic;
+        let events = if self.has_inner_events { happened } else { dropped };
+        events.push_back(event);
     }
 }

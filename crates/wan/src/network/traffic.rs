@@ -22,6 +22,9 @@ pub(super) struct Traffic<P> {
     pending: EventQueue<Pending<P>>,
     groups: Groups<P>,
     pub(super) happened: VecDeque<PacketEvent<P, Path>>,
+    /// Packets dropped at their offer in a network without inner events, in the order of their instants. A packet comes after all arrivals due at its instant,
+    /// and these need not happen before the poll.
+    pub(super) dropped: VecDeque<PacketEvent<P, Path>>,
     /// Damage of packets on their way, indexed by path, sequence and copy bits. A packet has an entry exactly if its flag `DAMAGED` is set, so undamaged
     /// packets are never looked up.
     damages: BTreeMap<(Path, u64, u8), Damage>,
@@ -31,7 +34,14 @@ pub(super) struct Traffic<P> {
 
 impl<P: Clone> Traffic<P> {
     pub(super) fn new() -> Self {
-        Self { pending: EventQueue::new(), groups: Groups::new(), happened: VecDeque::new(), damages: BTreeMap::new(), awaited: None }
+        Self {
+            pending: EventQueue::new(),
+            groups: Groups::new(),
+            happened: VecDeque::new(),
+            dropped: VecDeque::new(),
+            damages: BTreeMap::new(),
+            awaited: None,
+        }
     }
 
     /// Returns the instant of the next event.
@@ -42,12 +52,13 @@ impl<P: Clone> Traffic<P> {
     /// Returns whether an event may be due at `now`, without a search. `false` is certain.
     #[inline(always)]
     pub(super) fn may_be_due(&self, now: Instant) -> bool {
-        self.groups.next_at().is_some_and(|at| at <= now) || self.pending.may_be_due(now)
+        !self.dropped.is_empty() || self.groups.next_at().is_some_and(|at| at <= now) || self.pending.may_be_due(now)
     }
 
-    /// Removes and returns the first event if its instant is at most `now`.
+    /// Removes and returns the first event if its instant is at most `now`, and at most the instant of the first packet in `dropped`.
     #[inline(always)]
     pub(super) fn pop_due(&mut self, now: Instant) -> Option<Pending<P>> {
+        let now = self.dropped.front().map_or(now, |dropped| dropped.at);
         match self.groups.due_key(now) {
             // In most networks with groups the queue is empty.
             Some(key) if self.pending.is_empty() || self.pending.due_key(now).is_none_or(|other| key < other) => self.groups.take(),
