@@ -316,14 +316,11 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         // The network first computes everything due by now. The events are then polled in the order of time.
         network.handle_timeout(now).expect("instants come in order");
         let mut receivers = Receivers { members, samples, remote, axes: *axes };
-        loop {
-            // Nearly all events are simple arrivals. For these the network need not build a complete event.
-            while let Some(taken) = network.take_mere_arrival(|event| receivers.take(now, &event, observer, watch)) {
-                taken?;
-            }
-            let Some(event) = network.poll_event() else { return Ok(()) };
-            receivers.take(now, &event, observer, watch)?;
+        // Nearly all events are simple arrivals. For these the network need not build a complete event.
+        while let Some(taken) = network.take_mere_arrival(|event| receivers.take(now, &event, observer, watch)) {
+            taken?;
         }
+        if network.may_have_events(now) { receivers.take_all(network, now, observer, watch) } else { Ok(()) }
     }
 
     /// Steps 3 and 4 of an instant: each ticking peer computes its forces and moves to its next tick.
@@ -527,6 +524,22 @@ struct Receivers<'a, const A: usize, S, E: Remote<A>> {
 }
 
 impl<const A: usize, S: Strategy<A>, E: Remote<A>> Receivers<'_, A, S, E> {
+    /// Handles all events of packets that have happened by now. Not inlined, so that the loop over simple arrivals has the registers for itself
+    /// (`benches/peers`, rows of watched packets).
+    #[inline(never)]
+    fn take_all(
+        &mut self,
+        network: &mut Network<Handle>,
+        now: Instant,
+        observer: &mut (impl Observer<Error = Ended> + ?Sized),
+        watch: Watch,
+    ) -> Result<(), Ended> {
+        while let Some(event) = network.poll_event() {
+            self.take(now, &event, observer, watch)?;
+        }
+        Ok(())
+    }
+
     /// Handles an event of a packet: hands over a delivered sample, releases the stored sample, shows the packet's record.
     #[inline(always)]
     fn take(
