@@ -1,7 +1,8 @@
 //! Loopback of a host: packets of the host to itself, on links to and from a node of its own, as if the servers of the host were another host.
 //!
-//! Both ends of such a packet have the same address, and the port of a test's server is as arbitrary as that of its client. So the direction of a packet does
-//! not follow from the packet. The sender of the first packet of a flow is the client: the sender of the SYN, or of the first datagram.
+//! Both ends of such a packet have the same address, and the kernel most often chooses the port of a test's server as well as the port of a client. So the
+//! direction of a packet does not follow from the packet. The sender of the first packet of a flow is the client: the sender of the SYN, or of the first
+//! datagram.
 
 use core::net::{IpAddr, SocketAddr};
 use std::collections::BTreeMap;
@@ -49,7 +50,7 @@ impl Loopback {
         let fragments =
             packet.fragment().map(|fragment| Key::Fragments(fragment.protocol, [headers.source, headers.destination], fragment.identification));
         if let (Some(key), None) = (fragments, headers.transport) {
-            // A later fragment has no ports. The kernel sends the first fragment before it.
+            // A later fragment has no ports. The kernel sends the first fragment before the later ones, so the table has the key.
             return self.flows.get_or_insert(key, true);
         }
         let is_of_client = if let Some(quoted) = packet.quoted_headers() {
@@ -109,7 +110,7 @@ struct Recent {
 }
 
 impl Recent {
-    /// Flows of a generation. A run has rarely as many, because each flow needs a socket; a forgotten flow counts as a new one.
+    /// Flows of a generation. Few runs have as many flows, because each flow needs a socket. A forgotten flow counts as a new flow.
     const MOST: usize = 1 << 16;
 
     /// Returns the value of a key. An unknown key gets the value `new`.
@@ -184,7 +185,7 @@ mod tests {
         assert_eq!(directions(questions.map(datagram)), [true, false, true, true, false, true, true]);
     }
 
-    /// A SYN opens a connection, so both ends of an earlier connection may change their roles. An answered SYN is none.
+    /// A SYN opens a connection, so both ends of an earlier connection may change their roles. A SYN that acknowledges opens nothing.
     #[test]
     fn the_sender_of_the_syn_is_the_client() {
         let [there, back] = [[40_000, 50_000], [50_000, 40_000]];

@@ -156,10 +156,10 @@ fn be_inside() {
             let answers: String = answers.collect();
             println!("inside: {answers} {}", questions.load(Ordering::Relaxed));
         }
-        // Addresses of IPv6 at which a server can listen.
+        // Listens at addresses of IPv6, and connects to `::1`.
         ["six"] => {
-            let kinds = ["[::1]:0", "[::]:0"].map(|at| TcpListener::bind(at).err().map(|error| error.kind()));
-            println!("inside: {kinds:?}");
+            let [own, all] = ["[::1]:0", "[::]:0"].map(|at| TcpListener::bind(at).err().map(|error| error.kind()));
+            println!("inside: {own:?} {all:?} {:?}", TcpStream::connect("[::1]:9").unwrap_err().kind());
         }
         // A datagram that is longer than a packet, and its echo.
         ["long", to] => {

@@ -140,17 +140,22 @@ impl Netlink {
         self.ask(NEW_LINK, REQUEST, &body)
     }
 
-    /// Adds a route to a table: packets to a network go into the device. A socket without an address gets the address `source`, or, with `None`, an address
-    /// of the device.
-    pub(super) fn route(&self, index: u32, to: Network, table: u8, source: Option<IpAddr>) -> io::Result<()> {
-        /// `RTPROT_STATIC`, `RT_SCOPE_UNIVERSE` and `RTN_UNICAST`.
-        const KIND: [u8; 3] = [4, 0, 1];
+    /// Adds a route to a table: packets to a network go into the device. Without a device the network is unreachable. A socket without an address gets the
+    /// address `source`, or, with `None`, an address of the device.
+    pub(super) fn route(&self, index: Option<u32>, to: Network, table: u8, source: Option<IpAddr>) -> io::Result<()> {
+        /// `RTPROT_STATIC` and `RT_SCOPE_UNIVERSE`.
+        const KIND: [u8; 2] = [4, 0];
+        /// `RTN_UNICAST` and `RTN_UNREACHABLE`.
+        const TYPES: [u8; 2] = [1, 7];
         // Fields of `struct rtmsg`: family, lengths of destination and source, type of service, table, the kind, and flags.
         let mut body = vec![family(to.address()), to.prefix(), 0, 0, table];
         body.extend(KIND);
+        body.push(TYPES[usize::from(index.is_none())]);
         body.extend([0; 4]);
         attribute(&mut body, ATTRIBUTE_DESTINATION, &octets(to.address()));
-        attribute(&mut body, ATTRIBUTE_DEVICE, &index.to_ne_bytes());
+        if let Some(index) = index {
+            attribute(&mut body, ATTRIBUTE_DEVICE, &index.to_ne_bytes());
+        }
         if let Some(source) = source {
             attribute(&mut body, ATTRIBUTE_OWN_SOURCE, &octets(source));
         }

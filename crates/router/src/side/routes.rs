@@ -28,7 +28,7 @@ pub fn lead_all(spec: &TunSpec) -> Result<(), Failed> {
         if spec.addresses.iter().any(|network| network.address().is_ipv4() == all.is_ipv4())
             && let Some(all) = Network::new(all, 0)
         {
-            netlink.route(device, all, MAIN, None).map_err(Failed::system("lead all packets into it"))?;
+            netlink.route(Some(device), all, MAIN, None).map_err(Failed::system("lead all packets into it"))?;
         }
     }
     Ok(())
@@ -37,7 +37,7 @@ pub fn lead_all(spec: &TunSpec) -> Result<(), Failed> {
 /// Leads the packets that programs of the calling thread's network namespace send to the namespace itself into the device of `spec`: packets of IPv4 to
 /// 127.0.0.0/8 and to the addresses of the device. Such a packet is delivered once the packet is written to the device. Comes after [`lead_all`].
 ///
-/// The address `::1` disappears. The kernel takes packets to `::1` from the loopback interface alone, so no device can carry them, and some programs choose
+/// The address `::1` disappears, and is unreachable. The kernel takes packets to `::1` from the loopback interface alone, so no device can carry them, and some programs choose
 /// `::1` for the name `localhost` by themselves.
 ///
 /// # Errors
@@ -53,10 +53,11 @@ pub fn lead_own(spec: &TunSpec) -> Result<(), Failed> {
     let own = v4.filter_map(|address| Some((Network::new(address, 32)?, address)));
     let loopback = Network::new(Ipv4Addr::new(127, 0, 0, 0).into(), 8).map(|network| (network, IpAddr::V4(Ipv4Addr::LOCALHOST)));
     for (network, source) in loopback.into_iter().chain(own) {
-        netlink.route(device, network, OWN, Some(source)).map_err(Failed::system(format!("lead packets to {network} into it")))?;
+        netlink.route(Some(device), network, OWN, Some(source)).map_err(Failed::system(format!("lead packets to {network} into it")))?;
     }
     // The table of the namespace's addresses is asked first otherwise, and leads all packets to the loopback interface. The rule for arriving packets stays, so
-    // that a packet from the device is delivered. A packet from 127.0.0.0/8 to another host is refused by the third rule, as `lo` refuses it otherwise.
+    // that a packet from the device is delivered. The third rule refuses packets from 127.0.0.0/8 to other hosts, as the kernel does without the setting
+    // `route_localnet`.
     let local = Rule { priority: 0, is_for_sent: false, source: None, table: Some(LOCAL) };
     let rules = [
         Rule { priority: 10, ..local },
@@ -67,13 +68,16 @@ pub fn lead_own(spec: &TunSpec) -> Result<(), Failed> {
         netlink.add_rule(rule).map_err(Failed::system("add a rule of routes"))?;
     }
     netlink.remove_rule(local).map_err(Failed::system("move the first rule of routes"))?;
-    // A system may give the loopback interface no address of IPv6.
     if spec.addresses.iter().any(|network| network.address().is_ipv6())
         && let Some(loopback) = Network::new(Ipv6Addr::LOCALHOST.into(), 128)
-        && let Err(error) = netlink.remove_address(index(LOOPBACK)?, loopback)
-        && error.kind() != ErrorKind::AddrNotAvailable
     {
-        return Err(Failed::system("remove the address ::1")(error));
+        // The default route would lead packets to `::1` into the device, and the kernel would drop the packets without a word to their sender.
+        netlink.route(None, loopback, MAIN, None).map_err(Failed::system("make ::1 unreachable"))?;
+        match netlink.remove_address(index(LOOPBACK)?, loopback) {
+            // A system may give the loopback interface no address of IPv6.
+            Err(error) if error.kind() != ErrorKind::AddrNotAvailable => return Err(Failed::system("remove the address ::1")(error)),
+            Ok(()) | Err(_) => {}
+        }
     }
     Ok(())
 }
