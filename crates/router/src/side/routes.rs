@@ -71,13 +71,14 @@ pub fn lead_own(spec: &TunSpec) -> Result<(), Failed> {
     if spec.addresses.iter().any(|network| network.address().is_ipv6())
         && let Some(loopback) = Network::new(Ipv6Addr::LOCALHOST.into(), 128)
     {
-        // The default route would lead packets to `::1` into the device, and the kernel would drop the packets without a word to their sender.
-        netlink.route(None, loopback, MAIN, None).map_err(Failed::system("make ::1 unreachable"))?;
         match netlink.remove_address(index(LOOPBACK)?, loopback) {
             // A system may give the loopback interface no address of IPv6.
             Err(error) if error.kind() != ErrorKind::AddrNotAvailable => return Err(Failed::system("remove the address ::1")(error)),
             Ok(()) | Err(_) => {}
         }
+        // The default route would lead packets to `::1` into the device, and the kernel would drop the packets without a word to their sender. The address has
+        // gone before, because the kernel removes routes to an address together with the address.
+        netlink.route(None, loopback, MAIN, None).map_err(Failed::system("make ::1 unreachable"))?;
     }
     Ok(())
 }
