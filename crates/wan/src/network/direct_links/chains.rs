@@ -36,7 +36,7 @@ pub(super) struct ChainStates {
 }
 
 /// Returns the smallest whole number n such that an event of this probability happens if and only if the upper 53 bits of its random word are below n.
-fn threshold(probability: Probability) -> u64 {
+pub(super) fn threshold(probability: Probability) -> u64 {
     const TWO_POW_53: f64 = 9_007_199_254_740_992.0;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number from 0 to 2^53")]
     // `Probability::happens` compares the upper 53 bits as a fraction with the probability, so the bound is the next whole number.
@@ -44,7 +44,7 @@ fn threshold(probability: Probability) -> u64 {
     threshold
 }
 
-const fn is_below(word: u64, threshold: u64) -> bool {
+pub(super) const fn is_below(word: u64, threshold: u64) -> bool {
     word >> 11 < threshold
 }
 

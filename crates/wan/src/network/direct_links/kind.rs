@@ -1,8 +1,8 @@
 //! Data shared by links of one configuration, and the state of each link.
 
-use cohaptic_units::Instant;
+use cohaptic_units::{Instant, Probability};
 
-use super::chains::Chains;
+use super::chains::{Chains, is_below, threshold};
 use super::losses::{InTime, Losses, Verdict};
 use crate::laws::delay::Law;
 use crate::line::direct::Words;
@@ -27,6 +27,8 @@ pub(super) struct Kind {
     pub(super) chains: Option<Chains>,
     /// `true` if links of this kind have state.
     pub(super) remembers: bool,
+    /// Threshold for a loss without state: the packet is lost if the upper 53 bits of its loss word are below the threshold.
+    loses_below: u64,
 }
 
 /// The transmitter of a link and its queue, for packets of one size.
@@ -86,7 +88,8 @@ impl Kind {
         let remembers = matches!(line, Line::Queued(_))
             || matches!(loss, Losses::GilbertElliott(_) | Losses::InTime(_))
             || matches!(delay, Delays::Correlated(_));
-        Some(Self { is_random: config.is_random(), keeps_order, loss, delay, line, chains, remembers })
+        let loses_below = threshold(if let Losses::Independent(probability) = loss { probability } else { Probability::ZERO });
+        Some(Self { is_random: config.is_random(), keeps_order, loss, delay, line, chains, remembers, loses_below })
     }
 
     /// Returns whether links that take turns between this kind and others need no more state than [`Remembered`]: a chain of delays, or a chain of losses
@@ -117,21 +120,24 @@ impl Kind {
         }
     }
 
-    /// Computes the fate of a packet of a link without state. `delay` is the packet's delay \[ns\], or [`Law::UNKNOWN`] to draw the delay.
+    /// Returns the instant at which a packet leaves the transmitter of a link without state.
     #[inline(always)]
-    pub(super) fn fate(&mut self, now: Instant, [loss_word, jitter_word]: Words, packet: PacketDraws, delay: u64) -> Verdict {
-        match (&self.loss, &mut self.delay) {
-            (Losses::Independent(probability), _) if probability.happens(loss_word) => Verdict::Lost,
-            (_, Delays::Independent(stage)) => {
-                let leaves = match self.line {
-                    Line::Free(nanos) => now.saturating_add_nanos(nanos),
-                    Line::Queued(_) => unreachable!("it remembers when the packet before left"),
-                };
-                let delay = if delay == Law::UNKNOWN { stage.draw_nanos(leaves, jitter_word, || packet) } else { delay };
-                Verdict::Arrives(leaves.saturating_add_nanos(delay))
-            }
-            (_, Delays::Correlated(_)) => unreachable!("it remembers the delay before"),
+    pub(super) fn leaves(&self, now: Instant) -> Instant {
+        // With a queue, a link has the departure of the packet before as its state.
+        if let Line::Free(nanos) = self.line { now.saturating_add_nanos(nanos) } else { now }
+    }
+
+    /// Computes the fate of a packet of a link without state that leaves the transmitter at `leaves`. `delay` is the packet's delay \[ns\], or
+    /// [`Law::UNKNOWN`] to draw the delay.
+    #[inline(always)]
+    pub(super) fn fate(&mut self, leaves: Instant, words: Words, packet: impl Fn() -> PacketDraws, delay: u64) -> Verdict {
+        if is_below(words[0], self.loses_below) {
+            return Verdict::Lost;
         }
+        if delay == Law::UNKNOWN {
+            return Verdict::Arrives(self.arrival(leaves, &mut { Remembered::NOTHING }, words, packet()));
+        }
+        Verdict::Arrives(leaves.saturating_add_nanos(delay))
     }
 
     /// Returns the delays of a packet of each of several links \[ns\], or [`Law::UNKNOWN`] where [`Kind::fate`] or [`Kind::verdict`] must draw the delay.
@@ -148,8 +154,15 @@ impl Kind {
     /// Computes the fate of a packet of a link with the state `link`, and changes the state. `delay` is the packet's delay \[ns\] with the value of the chain
     /// of delays, or [`Law::UNKNOWN`] to draw both.
     #[inline(always)]
-    pub(super) fn verdict(&mut self, now: Instant, link: &mut Remembered, words: Words, packet: PacketDraws, (value, delay): (f64, u64)) -> Verdict {
-        if self.loses(now, link, words, packet) {
+    pub(super) fn verdict(
+        &mut self,
+        now: Instant,
+        link: &mut Remembered,
+        words: Words,
+        packet: impl Fn() -> PacketDraws,
+        (value, delay): (f64, u64),
+    ) -> Verdict {
+        if self.loses(now, link, words, &packet) {
             return Verdict::Lost;
         }
         // Lost packets take no time to transmit, because losses come before the queue.
@@ -164,7 +177,7 @@ impl Kind {
             },
         };
         if delay == Law::UNKNOWN {
-            return Verdict::Arrives(self.arrival(leaves, link, words, packet));
+            return Verdict::Arrives(self.arrival(leaves, link, words, packet()));
         }
         // A link without a chain of delays may have its instant for a chain of losses.
         if let Delays::Correlated(_) = self.delay {
@@ -175,29 +188,44 @@ impl Kind {
 
     /// Returns whether a packet of a link with the state `link` is lost, and changes the state.
     #[inline(always)]
-    pub(super) fn loses(&mut self, now: Instant, link: &mut Remembered, [word, _]: Words, packet: PacketDraws) -> bool {
+    pub(super) fn loses(&mut self, now: Instant, link: &mut Remembered, [word, _]: Words, packet: impl Fn() -> PacketDraws) -> bool {
         match &mut self.loss {
             Losses::None => false,
             Losses::Independent(probability) => probability.happens(word),
-            Losses::GilbertElliott(chain) => chain.loses(&mut link.state, word, || packet.more(Purpose::Loss).next_word()),
-            Losses::InTime(chain) => link.loses_in_time(now, chain, word, packet),
+            Losses::GilbertElliott(chain) => chain.loses(&mut link.state, word, || packet().more(Purpose::Loss).next_word()),
+            Losses::InTime(chain) => link.loses_in_time(now, chain, word, packet()),
         }
     }
 
-    /// Returns the delays of [`Kind::delays`] for links with these states, whose packets are offered `now`, and the next values of the chains of delays.
+    /// Returns the latest values of the chains of delays of links with these states, whose packets are offered `now`. A value is NaN where the next value must
+    /// be computed by [`Kind::verdict`].
     #[inline(always)]
-    pub(super) fn delays_of_chains<const N: usize>(&self, now: Instant, links: &[Remembered], words: &[Words; N]) -> ([f64; N], [u64; N]) {
+    pub(super) fn values_of_chains<const N: usize>(&self, now: Instant, links: &[Remembered]) -> [f64; N] {
+        let mut values = [f64::NAN; N];
         // The delays of chains begin together only where no packet waits.
-        let (Delays::Correlated(delays), Line::Free(time)) = (&self.delay, self.line) else { return ([0.0; N], self.delays(words)) };
-        let (mut of_jitter, mut chains) = ([0; N], [(f64::NAN, Instant::MAX); N]);
-        for ((of_jitter, chain), ([_, word], link)) in of_jitter.iter_mut().zip(&mut chains).zip(words.iter().zip(links)) {
-            (*of_jitter, *chain) = (*word, (link.normal, link.at));
+        if let (Delays::Correlated(delays), Line::Free(time)) = (&self.delay, self.line) {
+            let leaves = now.saturating_add_nanos(time);
+            for (value, link) in values.iter_mut().zip(links) {
+                *value = if delays.has_weights(leaves, link.at) { link.normal } else { f64::NAN };
+            }
         }
-        delays.nanos_at_once(now.saturating_add_nanos(time), &chains, &of_jitter)
+        values
     }
 
-    /// Returns the arrival of a packet that leaves the transmitter at `leaves`, without the order of packets.
+    /// Returns the delays of [`Kind::delays`] for links with these values of the chains of delays, and the next values.
     #[inline(always)]
+    pub(super) fn delays_of_chains<const N: usize>(&self, chains: &[f64; N], words: &[Words; N]) -> ([f64; N], [u64; N]) {
+        let Delays::Correlated(delays) = &self.delay else { return (*chains, self.delays(words)) };
+        let mut of_jitter = [0; N];
+        for (of_jitter, [_, word]) in of_jitter.iter_mut().zip(words) {
+            *of_jitter = *word;
+        }
+        delays.nanos_at_once(chains, &of_jitter)
+    }
+
+    /// Returns the arrival of a packet that leaves the transmitter at `leaves`, without the order of packets. Not inlined, because most delays are drawn for
+    /// several links together.
+    #[inline(never)]
     pub(super) fn arrival(&mut self, leaves: Instant, link: &mut Remembered, [_, word]: Words, packet: PacketDraws) -> Instant {
         leaves.saturating_add_nanos(match &mut self.delay {
             Delays::Independent(delay) => delay.draw_nanos(leaves, word, || packet),

@@ -126,7 +126,7 @@ impl Kinds {
     #[inline]
     pub(super) fn verdict(&mut self, now: Instant, link: &mut Remembered, words: Words, packet: PacketDraws) -> (Verdict, bool) {
         match self.at(now) {
-            Some(kind) => (kind.verdict(now, link, words, packet, (f64::NAN, Law::UNKNOWN)), kind.keeps_order),
+            Some(kind) => (kind.verdict(now, link, words, || packet, (f64::NAN, Law::UNKNOWN)), kind.keeps_order),
             None => self.verdict_over_changes(now, link, words, packet),
         }
     }
@@ -135,7 +135,7 @@ impl Kinds {
     #[cold]
     fn verdict_over_changes(&mut self, now: Instant, link: &mut Remembered, words: Words, packet: PacketDraws) -> (Verdict, bool) {
         let kind = &mut self.all[self.present];
-        if kind.loses(now, link, words, packet) {
+        if kind.loses(now, link, words, || packet) {
             return (Verdict::Lost, kind.keeps_order);
         }
         let Some(states) = &self.states else { unreachable!("only a modulator changes the kind") };

@@ -445,6 +445,8 @@ fn alike<const REMEMBER: bool>(
     excluded: u8,
     arrivals: &mut Arrivals,
 ) {
+    // Copied before the draws, so that the copies are in the cache when they are read together.
+    let chains = if REMEMBER { kind.values_of_chains(now, remembered) } else { [f64::NAN; DirectLinks::AT_ONCE] };
     // The first random words of the next packet of each link, or zeros if the kind is not random.
     let mut words = [[0; 2]; DirectLinks::AT_ONCE];
     for (link, (words, sequence)) in links.iter().zip(words.iter_mut().zip(&mut arrivals.sequences)) {
@@ -454,18 +456,21 @@ fn alike<const REMEMBER: bool>(
         }
     }
     let (values, delays) = match REMEMBER {
-        true => kind.delays_of_chains(now, remembered, &words),
+        true => kind.delays_of_chains(&chains, &words),
         false => ([f64::NAN; DirectLinks::AT_ONCE], kind.delays(&words)),
     };
     let (mut bit, mut arrive, mut overtake, mut wait) = (1, 0, 0, 0);
+    let leaves = kind.leaves(now);
     for place in 0..links.len().min(DirectLinks::AT_ONCE) {
         let (link, words) = (&mut links[place], words[place]);
         // An excluded link counts no packet, so its next packet has the same number and random words.
         if excluded & bit == 0 {
-            let draws = link.draws.packet(link.offered);
+            // A closure, because only few packets need further draws, for which the parts of the address must be in memory.
+            let (stream, number) = (link.draws, link.offered);
+            let packet = move || stream.packet(number);
             let verdict = match REMEMBER {
-                true => kind.verdict(now, &mut remembered[place], words, draws, (values[place], delays[place])),
-                false => kind.fate(now, words, draws, delays[place]),
+                true => kind.verdict(now, &mut remembered[place], words, packet, (values[place], delays[place])),
+                false => kind.fate(leaves, words, packet, delays[place]),
             };
             link.offered += 1;
             match verdict {
@@ -473,7 +478,7 @@ fn alike<const REMEMBER: bool>(
                     let arrival = link.in_order(kind.keeps_order, wanted);
                     arrivals.at[place] = arrival;
                     arrive |= bit;
-                    wait |= if arrival > wanted { bit } else { 0 };
+                    wait |= u8::from(arrival > wanted) << place;
                     overtake |= if link.count_arrival(now, until, arrival) { bit } else { 0 };
                 }
                 Verdict::Lost => link.lost += 1,
@@ -537,8 +542,7 @@ impl LinkState {
     /// Returns the arrival of a packet, not before an earlier packet if `keeps_order` is set.
     #[inline(always)]
     fn in_order(&self, keeps_order: bool, at: Instant) -> Instant {
-        // Nobody can predict which packets wait, so the choice must not be a branch.
-        core::hint::select_unpredictable(keeps_order & (self.latest > at), self.latest, at)
+        if keeps_order { at.max(self.latest) } else { at }
     }
 
     /// Counts the arrival of a packet, and returns whether the packet overtakes an earlier packet.

@@ -210,21 +210,21 @@ impl CorrelatedDelays {
         Some(Self { marginal, law, memory, is_of_share, weights: Weights::new(memory, 0) })
     }
 
-    /// Returns the next values of the chains of several links whose packets begin to propagate `now`, and the delays \[ns\]. `chains` has the latest value
-    /// of each chain and the instant of the value. A delay is [`Law::UNKNOWN`] where [`draw_nanos`](Self::draw_nanos) must draw it, and the value has no
-    /// meaning then.
+    /// Returns the next values of several chains with these latest values, and the delays \[ns\]. A delay is [`Law::UNKNOWN`] where
+    /// [`draw_nanos`](Self::draw_nanos) must draw it, and the value has no meaning then.
     #[inline(always)]
-    pub(crate) fn nanos_at_once<const N: usize>(&self, now: Instant, chains: &[(f64, Instant); N], words: &[u64; N]) -> ([f64; N], [u64; N]) {
-        let Some(checked) = &self.law else { return ([0.0; N], [Law::UNKNOWN; N]) };
-        let (mut before, is_in_time) = ([0.0; N], self.is_in_time());
-        for (before, (value, at)) in before.iter_mut().zip(chains) {
-            // Links that are offered packets together have the weights of one span. The rare others are drawn singly.
-            let has_weights = !is_in_time || now.as_nanos().saturating_sub(at.as_nanos()) == self.weights.span;
-            *before = if has_weights { *value } else { f64::NAN };
-        }
-        let following = self.following(&before, words);
+    pub(crate) fn nanos_at_once<const N: usize>(&self, chains: &[f64; N], words: &[u64; N]) -> ([f64; N], [u64; N]) {
+        let Some(checked) = &self.law else { return ([f64::NAN; N], [Law::UNKNOWN; N]) };
+        let following = self.following(chains, words);
         let nanos = checked.law.whole_at_normals(&following);
         (following, nanos)
+    }
+
+    /// Returns whether the present weights are those of a packet that begins to propagate `now`, if the latest value of the chain is of the instant `at`. Links
+    /// that are offered packets together have the weights of one span.
+    #[inline(always)]
+    pub(crate) fn has_weights(&self, now: Instant, at: Instant) -> bool {
+        !self.is_in_time() || now.as_nanos().saturating_sub(at.as_nanos()) == self.weights.span
     }
 
     /// Returns whether the correlation depends on the time between packets.
