@@ -65,13 +65,16 @@ impl<const A: usize> Packet<A> {
 struct Ticks {
     /// Length of a tick \[ns\].
     nanos: u64,
-    /// ⌈2^64/nanos⌉. `None` if a tick has 2^31 ns or more, or 1 ns.
-    reciprocal: Option<u64>,
+    /// ⌈2^64/nanos⌉. Without meaning if a tick has 2^31 ns or more, or 1 ns.
+    reciprocal: u64,
+    /// Spans below this limit are divided by the reciprocal; 0 without a reciprocal.
+    limit: u64,
 }
 
 impl Ticks {
     fn new(nanos: u64) -> Self {
-        Self { nanos, reciprocal: (2..1 << 31).contains(&nanos).then(|| u64::MAX / nanos + 1) }
+        let has_reciprocal = (2..1 << 31).contains(&nanos);
+        Self { nanos, reciprocal: if has_reciprocal { u64::MAX / nanos + 1 } else { 0 }, limit: u64::from(has_reciprocal) << 31 }
     }
 
     /// Returns the number of ticks in `span` \[ns\], rounded up, without a division if possible.
@@ -80,10 +83,7 @@ impl Ticks {
     /// holds for n and d below 2^32.
     #[inline(always)]
     fn count(self, span: u64) -> u64 {
-        match self.reciprocal {
-            Some(reciprocal) if span < 1 << 31 => ((u128::from(span + self.nanos - 1) * u128::from(reciprocal)) >> 64) as u64,
-            _ => span.div_ceil(self.nanos),
-        }
+        if span < self.limit { ((u128::from(span + self.nanos - 1) * u128::from(self.reciprocal)) >> 64) as u64 } else { span.div_ceil(self.nanos) }
     }
 }
 
@@ -97,10 +97,10 @@ impl<const A: usize> InFlight<A> {
     /// Stores a packet known from the given tick and instant on. `overtakes`: `true` if the packet may arrive before an earlier packet of its link.
     #[inline(always)]
     pub(super) fn push(&mut self, at: (u64, Instant), packet: Packet<A>, overtakes: bool) {
-        let (ticks, due) = self.due_of(at, packet.arrival);
-        let list = if ticks >= HORIZON { beyond(&mut self.beyond, due, overtakes) } else { &mut self.wheel[spoke(due)][usize::from(overtakes)] };
-        // Written where it stays. A packet as an argument would be assembled on the stack and copied in words wider than its fields. Such a copy stalls the
-        // processor.
+        let (ticks, spoke) = self.due_of(at, packet.arrival);
+        let list = if ticks >= HORIZON { beyond(&mut self.beyond, at.0, ticks, overtakes) } else { &mut self.wheel[spoke][usize::from(overtakes)] };
+        // The packet is written to its final place. As an argument of a call, a packet would be assembled on the stack and copied in words wider than its
+        // fields. Such a copy stalls the processor.
         *self.packets.push(list).1 = packet;
     }
 
@@ -115,21 +115,21 @@ impl<const A: usize> InFlight<A> {
         // A packet that waits arrives after the present tick, together with the latest packet that arrives, so that packet is still in its place if no packet
         // between the two was lost. At each multiple of 2^16 a packet begins anew, so that `stands_for` has enough bits.
         let follows = waits & (latest.next == packet.sequence as u32) & (packet.sequence as u16 != 0);
-        let (ticks, due) = self.due_of(at, packet.arrival);
+        let (ticks, spoke) = self.due_of(at, packet.arrival);
         // Nobody can predict which packets follow, so there is no branch for them.
-        let list = if !follows & (ticks >= HORIZON) { beyond(&mut self.beyond, due, false) } else { &mut self.wheel[spoke(due)][0] };
+        let list = if !follows & (ticks >= HORIZON) { beyond(&mut self.beyond, at.0, ticks, false) } else { &mut self.wheel[spoke][0] };
         let (place, item) = self.packets.push_unless(follows, latest.place, list);
         let stands_for = std::hint::select_unpredictable(follows, item.stands_for.wrapping_add(1), 0);
         *item = Packet { stands_for, ..packet };
         *latest = Latest { place, next: (packet.sequence as u32).wrapping_add(1) };
     }
 
-    /// Returns the tick at which a packet is due with this arrival, and the number of ticks from the present tick to that tick.
+    /// Returns the number of ticks from the present tick to the tick at which a packet is due with this arrival, and the index of the latter in the wheel.
     #[inline(always)]
-    fn due_of(&self, (tick, now): (u64, Instant), arrival: Instant) -> (u64, u64) {
+    fn due_of(&self, (tick, now): (u64, Instant), arrival: Instant) -> (u64, usize) {
         // `now` is a multiple of the tick, so this sum is the first tick at or after the arrival.
         let ticks = self.ticks.count(arrival.as_nanos() - now.as_nanos());
-        (ticks, tick.saturating_add(ticks))
+        (ticks, spoke(tick.wrapping_add(ticks)))
     }
 
     /// Returns all packets in flight, in no particular order.
@@ -183,10 +183,10 @@ impl<const A: usize> InFlight<A> {
     }
 }
 
-/// Returns a list of packets that are due at a tick beyond the wheel.
+/// Returns a list of packets that are due `ticks` ticks after `tick`, beyond the wheel.
 #[cold]
-fn beyond(buckets: &mut BTreeMap<u64, Bucket>, due: u64, overtakes: bool) -> &mut List {
-    &mut buckets.entry(due).or_insert([List::EMPTY; 2])[usize::from(overtakes)]
+fn beyond(buckets: &mut BTreeMap<u64, Bucket>, tick: u64, ticks: u64, overtakes: bool) -> &mut List {
+    &mut buckets.entry(tick.saturating_add(ticks)).or_insert([List::EMPTY; 2])[usize::from(overtakes)]
 }
 
 /// Returns the index of a tick in the wheel.

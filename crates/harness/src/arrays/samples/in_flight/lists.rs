@@ -12,18 +12,15 @@ const NONE: u32 = u32::MAX;
 /// Memory of many lists.
 #[derive(Clone, Debug)]
 pub(super) struct Lists<T> {
-    blocks: Vec<Block<T>>,
+    /// Items of all blocks, indexed by place.
+    items: Vec<T>,
+    /// Number of the next block of the list, or of the next free block, indexed by number of a block. [`NONE`] after the last free block; without meaning in
+    /// the last block of a list.
+    following: Vec<u32>,
     /// Number of the free block given back last, or [`NONE`].
     free: u32,
     /// Item in places of a new block.
     fill: T,
-}
-
-#[derive(Clone, Debug)]
-struct Block<T> {
-    items: [T; BLOCK as usize],
-    /// Number of the next block of the list, or of the next free block. [`NONE`] after the last free block; without meaning in the last block of a list.
-    next: u32,
 }
 
 /// A list in [`Lists`]. All its blocks but the last are full.
@@ -41,12 +38,6 @@ const fn block_of(place: u32) -> usize {
     (place / BLOCK) as usize
 }
 
-/// Returns the index of a place in its block.
-#[inline(always)]
-const fn index_of(place: u32) -> usize {
-    (place % BLOCK) as usize
-}
-
 impl List {
     pub(super) const EMPTY: Self = Self { first: NONE, end: 0 };
 
@@ -59,7 +50,7 @@ impl List {
 impl<T: Copy> Lists<T> {
     /// Returns a memory without lists. `fill` stands in places without an item.
     pub(super) const fn new(fill: T) -> Self {
-        Self { blocks: Vec::new(), free: NONE, fill }
+        Self { items: Vec::new(), following: Vec::new(), free: NONE, fill }
     }
 
     /// Appends a place to a list, and returns the place, and the item there, which the caller replaces.
@@ -78,19 +69,19 @@ impl<T: Copy> Lists<T> {
         }
         let place = std::hint::select_unpredictable(is_in_place, instead, list.end);
         list.end += u32::from(!is_in_place);
-        (place, &mut self.blocks[block_of(place)].items[index_of(place)])
+        (place, &mut self.items[place as usize])
     }
 
     /// Appends a block to a list without room.
     #[inline(always)]
     fn lengthen(&mut self, list: &mut List) {
         let block = if self.free == NONE { self.grow() } else { self.free };
-        self.free = self.blocks[block as usize].next;
+        self.free = self.following[block as usize];
         if list.is_empty() {
             list.first = block;
         } else {
             // The list is full, so its end is the end of its last block.
-            self.blocks[block_of(list.end) - 1].next = block;
+            self.following[block_of(list.end) - 1] = block;
         }
         list.end = block * BLOCK;
     }
@@ -99,8 +90,9 @@ impl<T: Copy> Lists<T> {
     #[cold]
     #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 items fit into memory")]
     fn grow(&mut self) -> u32 {
-        self.blocks.push(Block { items: [self.fill; BLOCK as usize], next: NONE });
-        self.blocks.len() as u32 - 1
+        self.items.resize(self.items.len() + BLOCK as usize, self.fill);
+        self.following.push(NONE);
+        self.following.len() as u32 - 1
     }
 
     /// Returns the items of a list, in order, in slices of at most [`BLOCK`] items.
@@ -109,10 +101,10 @@ impl<T: Copy> Lists<T> {
         let mut next = (!list.is_empty()).then_some(list.first as usize);
         std::iter::from_fn(move || {
             let block = next?;
-            let last = block_of(list.end - 1);
-            let Block { items, next: following } = &self.blocks[block];
-            next = (block != last).then_some(*following as usize);
-            Some(if block == last { &items[..=index_of(list.end - 1)] } else { &items[..] })
+            let (first, end) = (block * BLOCK as usize, list.end as usize);
+            let is_last = block == block_of(list.end - 1);
+            next = if is_last { None } else { Some(self.following[block] as usize) };
+            Some(&self.items[first..if is_last { end } else { first + BLOCK as usize }])
         })
     }
 
@@ -120,7 +112,7 @@ impl<T: Copy> Lists<T> {
     #[inline(always)]
     pub(super) fn give_back(&mut self, list: List) {
         if !list.is_empty() {
-            self.blocks[block_of(list.end - 1)].next = self.free;
+            self.following[block_of(list.end - 1)] = self.free;
             self.free = list.first;
         }
     }
@@ -170,7 +162,7 @@ mod tests {
             assert_eq!(items(&lists, *list), *expected);
         }
         // Three blocks are the most that one of these lists takes.
-        assert!(lists.blocks.len() <= 3 * all.len(), "{} blocks", lists.blocks.len());
+        assert!(lists.following.len() <= 3 * all.len(), "{} blocks", lists.following.len());
     }
 
     #[test]
@@ -186,7 +178,7 @@ mod tests {
         let mut third = List::EMPTY;
         let places: Vec<u32> = (0..=2 * BLOCK).map(|_| lists.push(&mut third).0).collect();
         assert_eq!([places[0], places[BLOCK as usize], places[2 * BLOCK as usize]].map(block_of), [0, 1, 2]);
-        assert_eq!(lists.blocks.len(), 3);
+        assert_eq!(lists.following.len(), 3);
     }
 
     #[test]

@@ -158,8 +158,8 @@ impl<const A: usize, const L: usize> Received<A, L> {
         }
     }
 
-    /// Like [`take_in_order`](Self::take_in_order), for exact means. Takes in several samples at once, so the reads of held samples overlap before the sums need
-    /// the samples: these samples are more than a cache holds.
+    /// Like [`take_in_order`](Self::take_in_order), for exact means. Takes in several samples at once, so the reads of held samples overlap before the sums
+    /// need the samples: these samples are more than a cache holds.
     #[inline(always)]
     fn take_in_together(&mut self, packets: &[Packet<A>], unordered: &mut Vec<Packet<A>>) {
         for packets in packets.chunks(TAKEN_TOGETHER) {
