@@ -265,7 +265,8 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         if self.is_plain { self.compute_as::<true>(now, span) } else { self.compute_with_parts(now, span) }
     }
 
-    /// Computes the forces of a tick with optional parts. Not inlined, so that the frequent case stays small.
+    /// Computes the forces of a tick with optional parts. Not inlined, so that the frequent case stays small, and cold, so that its code lies in one piece.
+    #[cold]
     #[inline(never)]
     fn compute_with_parts(&mut self, now: Instant, span: Duration) -> Forces<A> {
         self.compute_as::<false>(now, span)

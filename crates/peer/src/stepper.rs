@@ -52,6 +52,7 @@ impl Stepper {
         if nanos(span) == self.short.0 { self.advance_by(&self.short.1, state, force) } else { self.advance_otherwise(state, span, force) }
     }
 
+    #[cold]
     #[inline(never)]
     fn advance_otherwise<const A: usize>(&self, state: &mut State<A>, span: Duration, force: [f64; A]) {
         self.advance_by(&self.map(span), state, force);

@@ -147,6 +147,7 @@ macro_rules! registry {
 
         impl<const A: usize> BuiltInStrategy<A> {
             /// Returns the command of a strategy with a memory.
+            #[cold]
             #[inline(never)]
             fn command_apart(&mut self, context: &Context<'_, A>) -> Command<A> {
                 match self {
