@@ -132,7 +132,7 @@ fn force(hand: Option<&Hand>, at: Instant) -> f64 {
 }
 
 /// Copies held by positions alone, over any network; the damping is still to be chosen.
-pub(crate) fn springs() -> impl Strategy<Value = Draft> {
+pub(crate) fn springs() -> BoxedStrategy<Draft> {
     let contact = select(vec![
         Contact::None,
         Contact::Grasp,
@@ -147,21 +147,23 @@ pub(crate) fn springs() -> impl Strategy<Value = Draft> {
     // The device's damping in parts of what its coupling asks for at least.
     let peer = (contact, hand, (100.0..4000.0, 0.8..4.0, 0.02..0.3), (-0.05..0.05, -0.5..0.5), 0..8_u64);
     let object = (0.05..2.0, any::<bool>(), 10.0..2000.0, select(&BOTH), select(vec![1_u64, 2, 4, 8]), any::<u32>());
-    (2..=4_usize).prop_flat_map(move |count| {
-        (object.clone(), vec(peer.clone(), count), links::any_network(count)).prop_map(move |(object, peers, links)| {
-            let (mass, split_mass, stiffness, strategy, every, seed) = object;
-            let gains = Gains { stiffness, damping: 0.0 };
-            let mut draft = Draft { duration: 500, seed, mass, split_mass, strategy, gains, update: 1000 * every, links, ..Draft::calm(count) };
-            for (peer, (contact, hand, (coupling, parts, mass), (position, velocity), phase)) in draft.peers.iter_mut().zip(peers) {
-                (peer.contact, peer.hand, peer.phase) = (contact, hand, phase % every);
-                peer.coupling = Gains { stiffness: coupling, damping: 0.0 };
-                peer.device.mass = mass;
-                peer.device.damping = coupling * TICK * parts;
-                (peer.position, peer.velocity) = (Some([position, 0.0, 0.0]), Some([velocity, 0.0, 0.0]));
-            }
-            draft
+    (2..=4_usize)
+        .prop_flat_map(move |count| {
+            (object.clone(), vec(peer.clone(), count), links::any_network(count)).prop_map(move |(object, peers, links)| {
+                let (mass, split_mass, stiffness, strategy, every, seed) = object;
+                let gains = Gains { stiffness, damping: 0.0 };
+                let mut draft = Draft { duration: 500, seed, mass, split_mass, strategy, gains, update: 1000 * every, links, ..Draft::calm(count) };
+                for (peer, (contact, hand, (coupling, parts, mass), (position, velocity), phase)) in draft.peers.iter_mut().zip(peers) {
+                    (peer.contact, peer.hand, peer.phase) = (contact, hand, phase % every);
+                    peer.coupling = Gains { stiffness: coupling, damping: 0.0 };
+                    peer.device.mass = mass;
+                    peer.device.damping = coupling * TICK * parts;
+                    (peer.position, peer.velocity) = (Some([position, 0.0, 0.0]), Some([velocity, 0.0, 0.0]));
+                }
+                draft
+            })
         })
-    })
+        .boxed()
 }
 
 /// Gives the copies the damping of the bound for what the links do, and `more` of it; answers with the largest age. What becomes of a packet does not depend on where the copies are.

@@ -28,26 +28,28 @@ const HEALED: u64 = 400;
 pub(crate) const PLAIN: &str = "jitter = \"0s\", order = \"allow-reordering\", loss = 0, duplicate = 0, corrupt = 0, reorder = 0, rate = \"unlimited\", slots = \"none\", outage = []";
 
 /// Two to four peers that are moved about until the links heal, which then have that delay \[µs\].
-fn moved() -> impl Strategy<Value = (Draft, u64)> {
+fn moved() -> BoxedStrategy<(Draft, u64)> {
     let peer = (any::<bool>(), (100.0..4000.0, 0.0..10.0), (0.05..0.3, 0.5..8.0), (-0.03..0.03, -0.3..0.3), 0..8_u64, -2.0..2.0);
     let object = (0.1..1.0, any::<bool>(), 0.2..3.0, (20.0..1200.0, 0.0..12.0), select(&BOTH), select(vec![4_u64, 8]), any::<u32>());
-    (2..=4_usize).prop_flat_map(move |count| {
-        (object.clone(), vec(peer.clone(), count), links::any_network(count), 0..=16_000_u64).prop_map(|(object, peers, links, delay)| {
-            let (mass, split_mass, damping, (stiffness, gain), strategy, every, seed) = object;
-            let mut draft = Draft { seed, mass, split_mass, damping, strategy, update: 1000 * every, links, ..Draft::calm(peers.len()) };
-            draft.gains = Gains { stiffness, damping: gain };
-            for (peer, (grasps, (coupling, loss), (mass, damping), (position, velocity), phase, force)) in draft.peers.iter_mut().zip(peers) {
-                peer.contact = if grasps { Contact::Grasp } else { Contact::None };
-                (peer.coupling, peer.phase) = (Gains { stiffness: coupling, damping: loss }, phase % every);
-                (peer.device.mass, peer.device.damping) = (mass, damping);
-                (peer.position, peer.velocity) = (Some([position, 0.0, 0.0]), Some([velocity, 0.0, 0.0]));
-                peer.hand = DraftHand::Force([force, 0.0, 0.0]);
-            }
-            let hands = draft.peers.iter().map(|peer| format!("at = \"{HEALED}ms\"\npeer = \"{}\"\nset = {{ hand = \"none\" }}", peer.name));
-            draft.timeline = hands.chain([format!("at = \"{HEALED}ms\"\nlink = \"all\"\nset = {{ delay = \"{delay}us\", {PLAIN} }}")]).collect();
-            (draft, delay)
+    (2..=4_usize)
+        .prop_flat_map(move |count| {
+            (object.clone(), vec(peer.clone(), count), links::any_network(count), 0..=16_000_u64).prop_map(|(object, peers, links, delay)| {
+                let (mass, split_mass, damping, (stiffness, gain), strategy, every, seed) = object;
+                let mut draft = Draft { seed, mass, split_mass, damping, strategy, update: 1000 * every, links, ..Draft::calm(peers.len()) };
+                draft.gains = Gains { stiffness, damping: gain };
+                for (peer, (grasps, (coupling, loss), (mass, damping), (position, velocity), phase, force)) in draft.peers.iter_mut().zip(peers) {
+                    peer.contact = if grasps { Contact::Grasp } else { Contact::None };
+                    (peer.coupling, peer.phase) = (Gains { stiffness: coupling, damping: loss }, phase % every);
+                    (peer.device.mass, peer.device.damping) = (mass, damping);
+                    (peer.position, peer.velocity) = (Some([position, 0.0, 0.0]), Some([velocity, 0.0, 0.0]));
+                    peer.hand = DraftHand::Force([force, 0.0, 0.0]);
+                }
+                let hands = draft.peers.iter().map(|peer| format!("at = \"{HEALED}ms\"\npeer = \"{}\"\nset = {{ hand = \"none\" }}", peer.name));
+                draft.timeline = hands.chain([format!("at = \"{HEALED}ms\"\nlink = \"all\"\nset = {{ delay = \"{delay}us\", {PLAIN} }}")]).collect();
+                (draft, delay)
+            })
         })
-    })
+        .boxed()
 }
 
 /// The scene as it is once its links are whole and its hands gone.

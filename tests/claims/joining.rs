@@ -111,7 +111,7 @@ fn elsewhere(draft: &Draft) -> Scene {
 }
 
 /// Two or three peers, the last of which lives elsewhere, and what their links are like until it comes to stay. If `held`, an arm that wants to rest at 0 holds the first one's device.
-fn scenes() -> impl Strategy<Value = (Draft, Vec<DraftLink>)> {
+fn scenes() -> BoxedStrategy<(Draft, Vec<DraftLink>)> {
     let object = (0.2..1.0, 0.2..3.0, 50.0..600.0, 1.0..10.0, select(&BOTH), select(vec![4_u64, 8]), 0..=12_000_u32);
     let whole = (object, 2..=3_usize, any::<bool>(), -0.03..0.03, 50.0..400.0).prop_map(|(object, count, held, place, arm)| {
         let (mass, damping, stiffness, gain, strategy, every, delay) = object;
@@ -125,27 +125,31 @@ fn scenes() -> impl Strategy<Value = (Draft, Vec<DraftLink>)> {
         }
         draft
     });
-    whole.prop_flat_map(|draft| {
-        let links = links::any_network(draft.peers.len());
-        (Just(draft), links)
-    })
+    whole
+        .prop_flat_map(|draft| {
+            let links = links::any_network(draft.peers.len());
+            (Just(draft), links)
+        })
+        .boxed()
 }
 
 /// Lives with silences between them, the last without end.
-fn lives() -> impl Strategy<Value = Vec<Life>> {
-    vec((0..500_u64, 1..500_u64, -0.05..0.05), 1..5).prop_map(|spans| {
-        let mut at = 0;
-        let mut lives: Vec<Life> = spans
-            .into_iter()
-            .map(|(silence, stay, place)| {
-                let from = at + silence;
-                at = from + stay + 1;
-                Life { from, to: from + stay, place }
-            })
-            .collect();
-        lives.last_mut().unwrap().to = u64::MAX;
-        lives
-    })
+fn lives() -> BoxedStrategy<Vec<Life>> {
+    vec((0..500_u64, 1..500_u64, -0.05..0.05), 1..5)
+        .prop_map(|spans| {
+            let mut at = 0;
+            let mut lives: Vec<Life> = spans
+                .into_iter()
+                .map(|(silence, stay, place)| {
+                    let from = at + silence;
+                    at = from + stay + 1;
+                    Life { from, to: from + stay, place }
+                })
+                .collect();
+            lives.last_mut().unwrap().to = u64::MAX;
+            lives
+        })
+        .boxed()
 }
 
 properties! {

@@ -67,18 +67,20 @@ fn largest_excess(log: &Log, peers: usize, (stiffness, damping): (f64, f64)) -> 
 }
 
 /// Three peers of any gains over any network.
-fn pushed() -> impl Strategy<Value = Draft> {
+fn pushed() -> BoxedStrategy<Draft> {
     let peer = (-3.0..3.0, any::<bool>(), 0..8_u64, -0.05..0.05);
     let object = (0.1..1.0, 0.0..5.0, (10.0..800.0, 0.0..15.0), select(&BOTH), select(vec![1_u64, 4, 8]), any::<u32>());
-    (object, vec(peer, 3), links::any_network(3)).prop_map(|((mass, damping, (stiffness, gain), strategy, every, seed), peers, links)| {
-        let mut draft = Draft { duration: 500, seed, mass, damping, strategy, update: 1000 * every, links, ..Draft::calm(3) };
-        draft.gains = Gains { stiffness, damping: gain };
-        for (peer, (force, grasps, phase, position)) in draft.peers.iter_mut().zip(peers) {
-            peer.contact = if grasps { Contact::Grasp } else { Contact::None };
-            (peer.hand, peer.phase, peer.position) = (DraftHand::Force([force, 0.0, 0.0]), phase % every, Some([position, 0.0, 0.0]));
-        }
-        draft
-    })
+    (object, vec(peer, 3), links::any_network(3))
+        .prop_map(|((mass, damping, (stiffness, gain), strategy, every, seed), peers, links)| {
+            let mut draft = Draft { duration: 500, seed, mass, damping, strategy, update: 1000 * every, links, ..Draft::calm(3) };
+            draft.gains = Gains { stiffness, damping: gain };
+            for (peer, (force, grasps, phase, position)) in draft.peers.iter_mut().zip(peers) {
+                peer.contact = if grasps { Contact::Grasp } else { Contact::None };
+                (peer.hand, peer.phase, peer.position) = (DraftHand::Force([force, 0.0, 0.0]), phase % every, Some([position, 0.0, 0.0]));
+            }
+            draft
+        })
+        .boxed()
 }
 
 properties! {

@@ -13,10 +13,10 @@ use proptest::prelude::*;
 use super::arrays::{difference, mesh, run, run_interrupted};
 
 /// Offset \[ns\] and drift [ppb] of each of up to eleven peers: some equal, some late by many ticks, some as fast or as slow as can be.
-fn clocks() -> impl Strategy<Value = Vec<(u64, i32)>> {
+fn clocks() -> BoxedStrategy<Vec<(u64, i32)>> {
     let offset = prop_oneof![2 => Just(0), 1 => Just(1_000_000), 3 => 0..3_000_000_u64, 1 => 0..90_000_000_u64];
     let drift = prop_oneof![Just(0), -100_000..100_000_i32, -100_000_000..100_000_000_i32, Just(100_000_000), Just(-100_000_000)];
-    prop_oneof![vec((offset.clone(), Just(0)), 11), vec((offset.clone(), -100_000..100_000_i32), 11), vec((offset, drift), 11),]
+    prop_oneof![vec((offset.clone(), Just(0)), 11), vec((offset.clone(), -100_000..100_000_i32), 11), vec((offset, drift), 11),].boxed()
 }
 
 properties! {

@@ -16,11 +16,11 @@ use super::arrays::{difference, mesh, run, run_interrupted};
 use super::watched::found;
 
 /// How many bits a second a line sends, of those that are offered: the samples of a link, a little less, a little more, or far more.
-fn parts() -> impl Strategy<Value = (f64, i64)> {
-    (prop_oneof![3 => Just(1.0), 1 => 0.8..1.3, 1 => Just(100.0)], -1..=1_i64)
+fn parts() -> BoxedStrategy<(f64, i64)> {
+    (prop_oneof![3 => Just(1.0), 1 => 0.8..1.3, 1 => Just(100.0)], -1..=1_i64).boxed()
 }
 
-fn disciplines() -> impl Strategy<Value = String> {
+fn disciplines() -> BoxedStrategy<String> {
     prop_oneof![
         Just("\"tail-drop\"".to_owned()),
         Just("\"head-drop\"".to_owned()),
@@ -38,10 +38,11 @@ fn disciplines() -> impl Strategy<Value = String> {
             1.0 - weight
         )),
     ]
+    .boxed()
 }
 
 /// Keys of a link, of which the rates are written as `{rate}` and `{tokens}`.
-fn keys() -> impl Strategy<Value = String> {
+fn keys() -> BoxedStrategy<String> {
     let delay = prop_oneof![
         Just("delay = \"9ms\""),
         Just("delay = \"9ms\", jitter = \"2ms\""),
@@ -53,6 +54,7 @@ fn keys() -> impl Strategy<Value = String> {
     let bucket = (0..200_u32).prop_map(|more| format!(", token-bucket = {{ rate = \"{{tokens}}bit\", burst = \"{{size+{more}}}B\" }}"));
     (delay, prop::option::weighted(0.8, line), prop::option::weighted(0.3, bucket))
         .prop_map(|(delay, line, bucket)| format!("{delay}{}{}", line.unwrap_or_default(), bucket.unwrap_or_default()))
+        .boxed()
 }
 
 /// Keys with the rates, as parts of what is offered.

@@ -28,8 +28,8 @@ fn topology(peers: usize, kind: u8, numbers: &[f64]) -> Topology {
     })
 }
 
-fn any_topology() -> impl Strategy<Value = (u8, Vec<f64>)> {
-    (0..4_u8, proptest::collection::vec(prop_oneof![Just(1.5), 0.01..3.0], 7..40))
+fn any_topology() -> BoxedStrategy<(u8, Vec<f64>)> {
+    (0..4_u8, proptest::collection::vec(prop_oneof![Just(1.5), 0.01..3.0], 7..40)).boxed()
 }
 
 /// The scene of a draft on a topology; `None` if its strategy is no law.

@@ -18,9 +18,9 @@ use proptest::sample::select;
 use crate::hard::ROUNDING;
 
 /// Spans at the edges of 64 bits, of a signed one, and of a `Duration` itself.
-fn span() -> impl Strategy<Value = Duration> {
+fn span() -> BoxedStrategy<Duration> {
     let edges = [0, 1, 2, 1_000_000, 1 << 62, i64::MAX as u64, (1 << 63) + 1, u64::MAX - 1, u64::MAX].map(Duration::from_nanos);
-    prop_oneof![3 => select(edges.to_vec()), 1 => Just(Duration::MAX), 1 => any::<u64>().prop_map(Duration::from_nanos)]
+    prop_oneof![3 => select(edges.to_vec()), 1 => Just(Duration::MAX), 1 => any::<u64>().prop_map(Duration::from_nanos)].boxed()
 }
 
 properties! {

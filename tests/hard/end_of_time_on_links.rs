@@ -21,7 +21,7 @@ fn nanos(nanos: u64) -> Duration {
 }
 
 /// Spans: none, short, and at the edges of 63 and 64 bits and of a `Duration`.
-fn span() -> impl Strategy<Value = Duration> + Clone {
+fn span() -> BoxedStrategy<Duration> {
     select(vec![
         nanos(0),
         nanos(1),
@@ -33,35 +33,36 @@ fn span() -> impl Strategy<Value = Duration> + Clone {
         nanos(u64::MAX),
         Duration::MAX,
     ])
+    .boxed()
 }
 
 /// Spans above zero; for what goes on and on, of a length that time holds a few hundred of at most.
-fn long_span() -> impl Strategy<Value = Duration> + Clone {
-    select(vec![nanos(1 << 56), nanos(1 << 62), nanos(i64::MAX as u64), nanos(u64::MAX), Duration::MAX])
+fn long_span() -> BoxedStrategy<Duration> {
+    select(vec![nanos(1 << 56), nanos(1 << 62), nanos(i64::MAX as u64), nanos(u64::MAX), Duration::MAX]).boxed()
 }
 
-fn rate() -> impl Strategy<Value = Rate> + Clone {
-    select(vec![1, 1000, 1 << 40, u64::MAX]).prop_map(|bits| Rate::bits_per_sec(bits).unwrap())
+fn rate() -> BoxedStrategy<Rate> {
+    select(vec![1, 1000, 1 << 40, u64::MAX]).prop_map(|bits| Rate::bits_per_sec(bits).unwrap()).boxed()
 }
 
-fn size() -> impl Strategy<Value = Bytes> + Clone {
-    select(vec![0, 1, 64, 1 << 40, u64::MAX]).prop_map(Bytes::new)
+fn size() -> BoxedStrategy<Bytes> {
+    select(vec![0, 1, 64, 1 << 40, u64::MAX]).prop_map(Bytes::new).boxed()
 }
 
-fn limit() -> impl Strategy<Value = Option<QueueLimit>> + Clone {
+fn limit() -> BoxedStrategy<Option<QueueLimit>> {
     let limits = prop_oneof![
         span().prop_map(QueueLimit::Time),
         size().prop_map(QueueLimit::Bytes),
         select(vec![0, 1, u64::MAX]).prop_map(QueueLimit::Packets)
     ];
-    option::of(limits)
+    option::of(limits).boxed()
 }
 
-fn framing() -> impl Strategy<Value = Framing> + Clone {
-    select(vec![0, i32::MIN, i32::MAX]).prop_map(|overhead| Framing { overhead, cells: None })
+fn framing() -> BoxedStrategy<Framing> {
+    select(vec![0, i32::MIN, i32::MAX]).prop_map(|overhead| Framing { overhead, cells: None }).boxed()
 }
 
-fn bottleneck() -> impl Strategy<Value = Bottleneck> + Clone {
+fn bottleneck() -> BoxedStrategy<Bottleneck> {
     let red = Red::new(Bytes::new(1), Bytes::new(u64::MAX), Probability::new(0.5).unwrap(), 0.002, Bytes::new(1500), false).unwrap();
     let codel = (span(), span()).prop_map(|(target, interval)| Discipline::CoDel(CoDel { target, interval, mtu: Bytes::ZERO, ecn: false }));
     let fq_codel = (span(), span()).prop_map(|(target, interval)| {
@@ -74,13 +75,15 @@ fn bottleneck() -> impl Strategy<Value = Bottleneck> + Clone {
     let recorded =
         select(vec!["1", "9000000000000", "0\n1\n1\n"]).prop_map(|text| Service::Recorded(DeliveryTrace::parse(text, Bytes::new(1500)).unwrap()));
     let service = prop_oneof![3 => rate().prop_map(Service::Rate), 1 => recorded];
-    (service, framing(), limit(), discipline).prop_map(|(service, framing, limit, discipline)| {
-        let framing = if matches!(service, Service::Recorded(_)) { Framing::default() } else { framing };
-        Bottleneck { service, framing, limit, discipline }
-    })
+    (service, framing(), limit(), discipline)
+        .prop_map(|(service, framing, limit, discipline)| {
+            let framing = if matches!(service, Service::Recorded(_)) { Framing::default() } else { framing };
+            Bottleneck { service, framing, limit, discipline }
+        })
+        .boxed()
 }
 
-fn outages() -> impl Strategy<Value = Outages> + Clone {
+fn outages() -> BoxedStrategy<Outages> {
     let scheduled = select(vec![(0, u64::MAX), (u64::MAX - 1, u64::MAX), (u64::MAX - 1000, u64::MAX - 10)])
         .prop_map(|(from, to)| Outages::new(vec![Outage { from: Instant::from_nanos(from), to: Instant::from_nanos(to) }]).unwrap());
     let sojourn = prop_oneof![
@@ -90,21 +93,21 @@ fn outages() -> impl Strategy<Value = Outages> + Clone {
     ];
     let random = (sojourn.clone(), sojourn).prop_map(|(up, down)| Outages::default().with_random(RandomOutages { up, down }).unwrap());
     let idle = (long_span(), long_span()).prop_map(|(after, down)| Outages::default().with_idle(IdleOutages { after, down }).unwrap());
-    prop_oneof![scheduled, random, idle]
+    prop_oneof![scheduled, random, idle].boxed()
 }
 
-fn delay() -> impl Strategy<Value = Delay> + Clone {
+fn delay() -> BoxedStrategy<Delay> {
     let longest = nanos(i64::MAX as u64);
     let jittered = (select(vec![nanos(0), longest / 2, longest]), select(vec![nanos(1), longest / 4, longest / 2]), option::of(long_span()));
     let jittered = jittered.prop_map(|(mean, sd, tau)| {
         let correlation = tau.map_or(Correlation::None, Correlation::InTime);
         Delay::with_jitter(mean, Jitter { correlation, ..Jitter::new(sd, Distribution::Normal) }).unwrap()
     });
-    prop_oneof![2 => span().prop_map(Delay::constant), 1 => jittered]
+    prop_oneof![2 => span().prop_map(Delay::constant), 1 => jittered].boxed()
 }
 
 /// Any link that is made of these.
-fn config() -> impl Strategy<Value = LinkConfig> + Clone {
+fn config() -> BoxedStrategy<LinkConfig> {
     let bucket = (rate(), size(), option::of((rate(), size())), framing(), limit()).prop_map(|(rate, burst, peak, framing, limit)| TokenBucket {
         rate,
         burst,
@@ -122,8 +125,8 @@ fn config() -> impl Strategy<Value = LinkConfig> + Clone {
     let layout =
         select(vec![(Layout::Physical, Order::AllowReordering), (Layout::Physical, Order::InOrder), (Layout::Netem, Order::AllowReordering)]);
     let queues = (option::weighted(0.3, bucket), option::weighted(0.5, bottleneck()), option::weighted(0.2, slots), option::weighted(0.3, reorder));
-    (option::weighted(0.3, outages()), queues, delay(), layout, option::weighted(0.2, select(vec![0, 1, u64::MAX]))).prop_map(
-        |(outages, (token_bucket, bottleneck, slots, reorder), delay, (layout, order), limit)| LinkConfig {
+    (option::weighted(0.3, outages()), queues, delay(), layout, option::weighted(0.2, select(vec![0, 1, u64::MAX])))
+        .prop_map(|(outages, (token_bucket, bottleneck, slots, reorder), delay, (layout, order), limit)| LinkConfig {
             outages: outages.unwrap_or_default(),
             duplication: Chance::independent(Probability::new(0.3).unwrap()),
             token_bucket,
@@ -135,8 +138,8 @@ fn config() -> impl Strategy<Value = LinkConfig> + Clone {
             layout,
             limit,
             ..LinkConfig::default()
-        },
-    )
+        })
+        .boxed()
 }
 
 fn is_recorded(config: &LinkConfig) -> bool {
@@ -149,12 +152,14 @@ fn bounded(size: Bytes, configs: &[&LinkConfig]) -> Bytes {
 }
 
 /// When packets are offered: a few at the beginning, then near the end, the last at the last instant.
-fn instants() -> impl Strategy<Value = Vec<Instant>> {
+fn instants() -> BoxedStrategy<Vec<Instant>> {
     let some = select(vec![0, 1, 1 << 40, 1 << 62, u64::MAX - 1_000_000_000, u64::MAX - 1000, u64::MAX - 2, u64::MAX - 1, u64::MAX]);
-    vec(some.prop_map(Instant::from_nanos), 1..25).prop_map(|mut instants| {
-        instants.sort_unstable();
-        instants
-    })
+    vec(some.prop_map(Instant::from_nanos), 1..25)
+        .prop_map(|mut instants| {
+            instants.sort_unstable();
+            instants
+        })
+        .boxed()
 }
 
 /// Takes all events out of a link; each happens at or after it was offered.

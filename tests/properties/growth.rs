@@ -17,34 +17,36 @@ use crate::eigenvectors::left_eigenvectors;
 const FRAMES: usize = 200;
 
 /// Any scene without walls, pushes, chance and change: two or three peers of all kinds, over any delays, with clocks that begin at any time.
-fn linear() -> impl Strategy<Value = Draft> {
+fn linear() -> BoxedStrategy<Draft> {
     let delays = proptest::collection::vec(0..40_000_u64, 7);
     // A run records no memory of a law, and ages repeat only between equal clocks.
-    (drafts::anything_among(2..=3_usize), delays, select(drafts::PAPER)).prop_map(|(mut draft, delays, strategy)| {
-        (draft.strategy, draft.send_when) = (strategy, None);
-        draft.enclosure = None;
-        draft.timeline.clear();
-        draft.link = format!("delay = \"{}us\"", delays[0]);
-        let names: Vec<String> = draft.peers.iter().map(|peer| peer.name.clone()).collect();
-        let pairs = names.iter().flat_map(|from| names.iter().filter(move |to| *to != from).map(move |to| (from, to)));
-        draft.links = pairs
-            .zip(&delays[1..])
-            .filter(|(_, delay)| *delay % 2 == 0)
-            .map(|((from, to), delay)| DraftLink { from: from.clone(), to: to.clone(), keys: format!("delay = \"{delay}us\"") })
-            .collect();
-        for peer in &mut draft.peers {
-            peer.drift = 0;
-            (peer.uplink, peer.downlink) = (None, None);
-            if matches!(peer.contact, Contact::Push(_)) {
-                peer.contact = Contact::Grasp;
+    (drafts::anything_among(2..=3_usize), delays, select(drafts::PAPER))
+        .prop_map(|(mut draft, delays, strategy)| {
+            (draft.strategy, draft.send_when) = (strategy, None);
+            draft.enclosure = None;
+            draft.timeline.clear();
+            draft.link = format!("delay = \"{}us\"", delays[0]);
+            let names: Vec<String> = draft.peers.iter().map(|peer| peer.name.clone()).collect();
+            let pairs = names.iter().flat_map(|from| names.iter().filter(move |to| *to != from).map(move |to| (from, to)));
+            draft.links = pairs
+                .zip(&delays[1..])
+                .filter(|(_, delay)| *delay % 2 == 0)
+                .map(|((from, to), delay)| DraftLink { from: from.clone(), to: to.clone(), keys: format!("delay = \"{delay}us\"") })
+                .collect();
+            for peer in &mut draft.peers {
+                peer.drift = 0;
+                (peer.uplink, peer.downlink) = (None, None);
+                if matches!(peer.contact, Contact::Push(_)) {
+                    peer.contact = Contact::Grasp;
+                }
+                peer.hand = match peer.hand {
+                    DraftHand::Arm { arm, .. } => DraftHand::Arm { arm, wanted: [0.0; 3] },
+                    DraftHand::None | DraftHand::Force(_) | DraftHand::Sine { .. } => DraftHand::None,
+                };
             }
-            peer.hand = match peer.hand {
-                DraftHand::Arm { arm, .. } => DraftHand::Arm { arm, wanted: [0.0; 3] },
-                DraftHand::None | DraftHand::Force(_) | DraftHand::Sine { .. } => DraftHand::None,
-            };
-        }
-        draft
-    })
+            draft
+        })
+        .boxed()
 }
 
 properties! {

@@ -68,19 +68,19 @@ properties! {
 }
 
 /// Copies that begin anywhere, with any speed, among 2, 3, 5 or 8 peers.
-fn untouched() -> impl Strategy<Value = Draft> {
+fn untouched() -> BoxedStrategy<Draft> {
     let starts = |size: f64| vec(-size..size, 8);
     let gains = (50.0..1000.0, 6.0..20.0);
-    (select(&[2_usize, 3, 5, 8][..]), select(drafts::PAPER), starts(0.05), starts(0.2), gains, any::<bool>()).prop_map(
-        |(count, strategy, positions, velocities, (stiffness, damping), split_mass)| {
+    (select(&[2_usize, 3, 5, 8][..]), select(drafts::PAPER), starts(0.05), starts(0.2), gains, any::<bool>())
+        .prop_map(|(count, strategy, positions, velocities, (stiffness, damping), split_mass)| {
             let mut draft = Draft { strategy, split_mass, mass: 1.5, ..Draft::calm(count) };
             (draft.gains.stiffness, draft.gains.damping) = (stiffness, damping);
             for (peer, (position, velocity)) in draft.peers.iter_mut().zip(positions.into_iter().zip(velocities)) {
                 (peer.position, peer.velocity) = (Some([position, 0.0, 0.0]), Some([velocity, 0.0, 0.0]));
             }
             draft
-        },
-    )
+        })
+        .boxed()
 }
 
 fn copy_mass(draft: &Draft) -> f64 {

@@ -170,8 +170,9 @@ fn same(found: Option<f64>, expected: Option<f64>, error: f64) -> bool {
     }
 }
 
-fn settings() -> impl Strategy<Value = (Index, Index, f64, f64)> {
+fn settings() -> BoxedStrategy<(Index, Index, f64, f64)> {
     (any::<Index>(), any::<Index>(), (-4.0..-1.0_f64).prop_map(|power| 10_f64.powf(power)), (-5.0..-1.0_f64).prop_map(|power| 10_f64.powf(power)))
+        .boxed()
 }
 
 fn of((peer, axis, distance, band): &(Index, Index, f64, f64), scene: &Scene) -> MeasureSettings {

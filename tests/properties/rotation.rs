@@ -108,14 +108,14 @@ impl Observer for Seen {
     }
 }
 
-fn triple(size: f64) -> impl Strategy<Value = Triple> {
-    [-size..size, -size..size, -size..size]
+fn triple(size: f64) -> BoxedStrategy<Triple> {
+    [-size..size, -size..size, -size..size].boxed()
 }
 
 const LAWS: [&str; 6] = ["average-position", "proportional-derivative", "extrapolated", "smoothed-average-position", "local-damping", "local-lag"];
 
 /// Scenes that stay near where they begin for as long as they last.
-fn turning() -> impl Strategy<Value = Turning> {
+fn turning() -> BoxedStrategy<Turning> {
     let attitude = ([-1.0..1.0, -1.0..1.0, -1.0..1.0, 0.2..1.0_f64], triple(3.0));
     let peer = (triple(0.01), triple(0.05), attitude, triple(0.05), triple(1.0), proptest::option::of(triple(0.01)));
     let peer = peer.prop_map(|(position, velocity, (orientation, rate), grasp, force, torque)| TurningPeer {
@@ -133,8 +133,8 @@ fn turning() -> impl Strategy<Value = Turning> {
     let gains = (50.0..200.0_f64, 1.0..4.0_f64, [0.05..0.1_f64, 0.05..0.1, 0.05..0.1], 1e-4..1e-3_f64);
     let link = select(&["", "delay = \"3ms\"", "delay = \"5ms\"\nloss = \"20%\"", "delay = \"4ms\"\njitter = \"2ms\""][..]);
     let timing = (any::<bool>(), select(&["1ms", "8ms"][..]), link);
-    (select(&LAWS[..]), gains, bodies, timing, vec(peer, 2..=6)).prop_map(
-        |(strategy, gains, (mass, inertia, damping), (compute_delay, update, link), peers)| Turning {
+    (select(&LAWS[..]), gains, bodies, timing, vec(peer, 2..=6))
+        .prop_map(|(strategy, gains, (mass, inertia, damping), (compute_delay, update, link), peers)| Turning {
             strategy,
             gains,
             mass,
@@ -144,8 +144,8 @@ fn turning() -> impl Strategy<Value = Turning> {
             update,
             link: link.to_owned(),
             peers,
-        },
-    )
+        })
+        .boxed()
 }
 
 fn product(p: [f64; 4], q: [f64; 4]) -> [f64; 4] {

@@ -176,12 +176,12 @@ fn turned(attitude: &Attitude, vector: Triple) -> Triple {
     attitude.matrix().map(|row| dot(row, vector))
 }
 
-fn triple(size: f64) -> impl Strategy<Value = Triple> {
-    [-size..size, -size..size, -size..size]
+fn triple(size: f64) -> BoxedStrategy<Triple> {
+    [-size..size, -size..size, -size..size].boxed()
 }
 
 /// Two to five peers with turns of any size, `turning` devices among them or not.
-fn turns(turning: bool) -> impl Strategy<Value = Turned> {
+fn turns(turning: bool) -> BoxedStrategy<Turned> {
     let orientation = [-1.0..1.0, -1.0..1.0, -1.0..1.0, 0.2..1.0_f64];
     let start = (triple(0.05), triple(0.3), orientation, triple(15.0), triple(0.03), any::<bool>());
     let start = start.prop_map(move |(position, velocity, orientation, rate, grasp, turns)| Start {
@@ -196,6 +196,7 @@ fn turns(turning: bool) -> impl Strategy<Value = Turned> {
     let sums = |low: f64, high: f64| [low..high, low..high, low..high].prop_map(|[a, b, c]| [b + c, c + a, a + b]);
     (0.3..1.0_f64, sums(1e-4, 1e-3), 50.0..300.0_f64, 100.0..1000.0_f64, sums(0.01, 0.05), vec(start, 2..=5))
         .prop_map(|(mass, inertia, stiffness, coupling, turning, peers)| Turned { mass, inertia, stiffness, coupling, turning, peers })
+        .boxed()
 }
 
 properties! {

@@ -13,40 +13,42 @@ use proptest::prelude::*;
 const FRAMES: usize = 4;
 
 /// Two or three peers over links of any constant delays and patterns of loss.
-fn linear() -> impl Strategy<Value = Draft> {
+fn linear() -> BoxedStrategy<Draft> {
     let link = (0..30_000_u64, 0..3_u64, 1..4_u64);
-    (drafts::anything_among(2..=3_usize), vec(link, 6), 0.5..50.0, 0..2_usize).prop_map(|(mut draft, links, impedance, on_loss)| {
-        (draft.strategy, draft.send_when, draft.integrator, draft.enclosure) = (Coordination::Wave, None, None, None);
-        let settings = draft.settings.of_mut(Coordination::Wave);
-        settings.set(0, LawValue::Number(impedance));
-        settings.set(1, LawValue::Word(on_loss));
-        draft.timeline.clear();
-        draft.link = String::new();
-        let names: Vec<String> = draft.peers.iter().map(|peer| peer.name.clone()).collect();
-        let pairs = names.iter().flat_map(|from| names.iter().filter(move |to| *to != from).map(move |to| (from.clone(), to.clone())));
-        let keys = |(delay, lost, every): (u64, u64, u64)| {
-            let loss = if lost < every { format!(", loss = {{ packets = [{lost}], every = {every} }}") } else { String::new() };
-            format!("delay = \"{delay}us\"{loss}")
-        };
-        draft.links = pairs.zip(links).map(|((from, to), link)| DraftLink { from, to, keys: keys(link) }).collect();
-        for peer in &mut draft.peers {
-            (peer.drift, peer.compute_delay, peer.uplink, peer.downlink) = (0, false, None, None);
-            // A frame begins at 0, when nothing has happened yet.
-            peer.offset %= 1000 * peer.tick;
-            if matches!(peer.contact, Contact::Push(_)) {
-                peer.contact = Contact::Grasp;
-            }
-            peer.hand = match peer.hand {
-                DraftHand::Arm { arm, .. } => {
-                    // The position of the last sample is relative to the copy, but where an arm holds it: it begins at 0.
-                    peer.position = Some([0.0; 3]);
-                    DraftHand::Arm { arm, wanted: [0.0; 3] }
-                }
-                DraftHand::None | DraftHand::Force(_) | DraftHand::Sine { .. } => DraftHand::None,
+    (drafts::anything_among(2..=3_usize), vec(link, 6), 0.5..50.0, 0..2_usize)
+        .prop_map(|(mut draft, links, impedance, on_loss)| {
+            (draft.strategy, draft.send_when, draft.integrator, draft.enclosure) = (Coordination::Wave, None, None, None);
+            let settings = draft.settings.of_mut(Coordination::Wave);
+            settings.set(0, LawValue::Number(impedance));
+            settings.set(1, LawValue::Word(on_loss));
+            draft.timeline.clear();
+            draft.link = String::new();
+            let names: Vec<String> = draft.peers.iter().map(|peer| peer.name.clone()).collect();
+            let pairs = names.iter().flat_map(|from| names.iter().filter(move |to| *to != from).map(move |to| (from.clone(), to.clone())));
+            let keys = |(delay, lost, every): (u64, u64, u64)| {
+                let loss = if lost < every { format!(", loss = {{ packets = [{lost}], every = {every} }}") } else { String::new() };
+                format!("delay = \"{delay}us\"{loss}")
             };
-        }
-        draft
-    })
+            draft.links = pairs.zip(links).map(|((from, to), link)| DraftLink { from, to, keys: keys(link) }).collect();
+            for peer in &mut draft.peers {
+                (peer.drift, peer.compute_delay, peer.uplink, peer.downlink) = (0, false, None, None);
+                // A frame begins at 0, when nothing has happened yet.
+                peer.offset %= 1000 * peer.tick;
+                if matches!(peer.contact, Contact::Push(_)) {
+                    peer.contact = Contact::Grasp;
+                }
+                peer.hand = match peer.hand {
+                    DraftHand::Arm { arm, .. } => {
+                        // The position of the last sample is relative to the copy, but where an arm holds it: it begins at 0.
+                        peer.position = Some([0.0; 3]);
+                        DraftHand::Arm { arm, wanted: [0.0; 3] }
+                    }
+                    DraftHand::None | DraftHand::Force(_) | DraftHand::Sine { .. } => DraftHand::None,
+                };
+            }
+            draft
+        })
+        .boxed()
 }
 
 /// The states of the bodies at the beginning of a frame; `None` for what no run records.

@@ -1,7 +1,7 @@
 //! Scenes at random.
 //!
-//! Strategies of many parts are boxed. An unboxed strategy is a type of its own with all its parts inside: each property that draws a scene would compile all of
-//! them again, and not optimised it would need more than the two megabytes of a test's stack.
+//! Strategies are boxed, the small ones too. An unboxed strategy is a type of its own with all its parts inside: each property that draws a scene would compile
+//! all of them again, and not optimised it would need more than the two megabytes of a test's stack.
 
 use std::time::Duration;
 
@@ -19,18 +19,18 @@ use crate::{Draft, DraftHand, DraftLink, DraftPeer, Place, contact_to_toml};
 pub const PAPER: &[Coordination] = &[Coordination::AveragePosition, Coordination::ProportionalDerivative];
 
 /// Anything that a scene can hold: 2 to 5 peers, every kind of link, contact, hand and clock, up to three axes, changes on the way. It may be unstable.
-pub fn anything() -> impl Strategy<Value = Draft> {
-    anything_among(2..=5_usize)
+pub fn anything() -> BoxedStrategy<Draft> {
+    anything_among(2..=5_usize).boxed()
 }
 
 /// [`anything`] with a law of the paper.
-pub fn anything_of_the_paper() -> impl Strategy<Value = Draft> {
-    (anything(), select(PAPER)).prop_map(|(draft, strategy)| Draft { strategy, send_when: None, ..draft })
+pub fn anything_of_the_paper() -> BoxedStrategy<Draft> {
+    (anything(), select(PAPER)).prop_map(|(draft, strategy)| Draft { strategy, send_when: None, ..draft }).boxed()
 }
 
 /// A strategy with values for the parameters that it has of its own, up to 40 ms, 40 N·s/m or 40 mJ.
-fn strategy() -> impl Strategy<Value = (Coordination, LawSettings)> {
-    (select(Coordination::ALL), 0..40_000_u32).prop_map(|(law, micros)| {
+fn strategy() -> BoxedStrategy<(Coordination, LawSettings)> {
+    let draw = |(law, micros): (Coordination, u32)| {
         let mut settings = LawSettings::default();
         for (place, parameter) in law.parameters().iter().enumerate() {
             let value = match parameter.form {
@@ -46,17 +46,16 @@ fn strategy() -> impl Strategy<Value = (Coordination, LawSettings)> {
             settings.of_mut(law).set(place, value);
         }
         (law, settings)
-    })
+    };
+    (select(Coordination::ALL), 0..40_000_u32).prop_map(draw).boxed()
 }
 
 /// Dead bands.
-fn send_when() -> impl Strategy<Value = SendWhen> {
+fn send_when() -> BoxedStrategy<SendWhen> {
     let heartbeat = option::of((1..100_u64).prop_map(Duration::from_millis));
-    (0.0..0.99, option::of(1e-6..1e-2), heartbeat).prop_map(|(velocity, position, heartbeat)| SendWhen {
-        velocity: Some(velocity),
-        position,
-        heartbeat,
-    })
+    (0.0..0.99, option::of(1e-6..1e-2), heartbeat)
+        .prop_map(|(velocity, position, heartbeat)| SendWhen { velocity: Some(velocity), position, heartbeat })
+        .boxed()
 }
 
 /// Without what readers refuse for its strategy.
@@ -82,7 +81,7 @@ fn with_what_its_strategy_can_have(mut draft: Draft) -> Draft {
 }
 
 /// [`anything`] with this number of peers.
-pub fn anything_among(peers: impl Strategy<Value = usize> + 'static) -> impl Strategy<Value = Draft> {
+pub fn anything_among(peers: impl Strategy<Value = usize> + 'static) -> BoxedStrategy<Draft> {
     (peers, 1..=3_usize)
         .prop_flat_map(|(count, axes)| {
             let header = (30..200_u64, any::<u32>(), 0.05..2.0, 0.0..2.0, any::<bool>(), option::weighted(0.3, walls()));
@@ -96,7 +95,8 @@ pub fn anything_among(peers: impl Strategy<Value = usize> + 'static) -> impl Str
             let peers = (vec(any_peer(axes), count), any_clocks(count));
             let network = (link(), vec((0..count, 1..count, link()), 0..3), vec(option::weighted(0.2, link()), 2 * count));
             let rest = (integrator(), vec((1..30_u64, change(count, axes)), 0..4));
-            (header, bodies, peers, network, rest).prop_map(move |(header, bodies, (mut peers, clocks), network, (integrator, changes))| {
+            let parts = (header.boxed(), bodies.boxed(), peers.boxed(), network.boxed(), rest.boxed());
+            parts.prop_map(move |(header, bodies, (mut peers, clocks), network, (integrator, changes))| {
                 let (duration, seed, mass, damping, split_mass, enclosure) = header;
                 let (position, velocity, ((strategy, settings), send_when), gains, update) = bodies;
                 let (link, links, mut lines) = network;
@@ -145,20 +145,20 @@ pub fn anything_among(peers: impl Strategy<Value = usize> + 'static) -> impl Str
 
 /// Scenes of one shape that need no events, if nobody watches: this number of them, with equal peers, ticks and durations, without access lines. Everything else
 /// may differ, in half of the cases even the links.
-pub fn alike(scenes: impl Strategy<Value = usize> + 'static) -> impl Strategy<Value = Vec<Draft>> {
-    of_one_shape(scenes, link_or_delay(), false)
+pub fn alike(scenes: impl Strategy<Value = usize> + 'static) -> BoxedStrategy<Vec<Draft>> {
+    of_one_shape(scenes, link_or_delay(), false).boxed()
 }
 
 /// [`alike`], with one timeline.
-pub fn changing(scenes: impl Strategy<Value = usize> + 'static) -> impl Strategy<Value = Vec<Draft>> {
-    of_one_shape(scenes, link_or_delay(), true)
+pub fn changing(scenes: impl Strategy<Value = usize> + 'static) -> BoxedStrategy<Vec<Draft>> {
+    of_one_shape(scenes, link_or_delay(), true).boxed()
 }
 
 fn of_one_shape(
     scenes: impl Strategy<Value = usize> + 'static,
     link: impl Strategy<Value = String> + Clone + 'static,
     with_timeline: bool,
-) -> impl Strategy<Value = Vec<Draft>> {
+) -> BoxedStrategy<Vec<Draft>> {
     let counts = prop_oneof![3 => 2..=5_usize, 1 => 6..=11_usize];
     (scenes, counts)
         .prop_flat_map(move |(scenes, count)| {
@@ -209,15 +209,12 @@ fn of_one_shape(
 /// A scene whose motions stay bounded and depend continuously on where bodies begin: gains far from the edge of stability at the ages that `link` and
 /// update make, grasps but no pushes, no walls, constant forces, equal clocks, one axis. The gains of the proportional-derivative strategy are the
 /// smaller, the more peers there are.
-pub fn well_behaved(
-    peers: impl Strategy<Value = usize> + 'static,
-    link: impl Strategy<Value = String> + Clone + 'static,
-) -> impl Strategy<Value = Draft> {
+pub fn well_behaved(peers: impl Strategy<Value = usize> + 'static, link: impl Strategy<Value = String> + Clone + 'static) -> BoxedStrategy<Draft> {
     peers
         .prop_flat_map(move |count| {
             let peer = (any::<bool>(), any::<bool>(), 0..2_u64, 0.1..0.3, 1.0..5.0, gains(1500.0, 8.0), -1.0..1.0, -0.01..0.01);
             let header = (any::<u32>(), 0.5..1.0, 0.5..2.0, select(PAPER), 50.0..300.0, 5.0..15.0, 1..=4_u64);
-            (header, vec(peer, count), link.clone()).prop_map(move |(header, peers, link)| {
+            (header.boxed(), vec(peer.boxed(), count), link.clone()).prop_map(move |(header, peers, link)| {
                 let (seed, mass, damping, strategy, stiffness, gain, multiple) = header;
                 let mut draft = Draft { seed, mass, damping, split_mass: false, strategy, link, update: multiple * 2000, ..Draft::calm(count) };
                 let several = strategy == Coordination::ProportionalDerivative;
@@ -238,29 +235,26 @@ pub fn well_behaved(
 }
 
 /// Keys of a link without chance.
-pub fn fixed_link() -> impl Strategy<Value = String> + Clone {
-    prop_oneof![Just(String::new()), (0..6000_u32).prop_map(|us| format!("delay = \"{us}us\""))]
+pub fn fixed_link() -> BoxedStrategy<String> {
+    prop_oneof![Just(String::new()), (0..6000_u32).prop_map(|us| format!("delay = \"{us}us\""))].boxed()
 }
 
 /// Keys of a [`link`], in half of the cases of nothing but a constant delay.
-fn link_or_delay() -> impl Strategy<Value = String> + Clone {
-    prop_oneof![link(), constant_delay()]
+fn link_or_delay() -> BoxedStrategy<String> {
+    prop_oneof![link(), constant_delay()].boxed()
 }
 
-fn constant_delay() -> impl Strategy<Value = String> + Clone {
-    (0..40_000_u32).prop_map(|us| format!("delay = \"{us}us\", jitter = \"0s\""))
+fn constant_delay() -> BoxedStrategy<String> {
+    (0..40_000_u32).prop_map(|us| format!("delay = \"{us}us\", jitter = \"0s\"")).boxed()
 }
 
 /// Keys of a link of any kind.
-pub fn link() -> impl Strategy<Value = String> + Clone {
+pub fn link() -> BoxedStrategy<String> {
     link_with(&["tail-drop", "tail-drop", "head-drop", "codel"], option::weighted(0.2, 0.01..0.3))
 }
 
 /// Keys of a link whose queue, if there is one, has one of these disciplines, with that probability of a copy.
-fn link_with(
-    disciplines: &'static [&'static str],
-    copies: impl Strategy<Value = Option<f64>> + Clone + 'static,
-) -> impl Strategy<Value = String> + Clone {
+fn link_with(disciplines: &'static [&'static str], copies: impl Strategy<Value = Option<f64>> + Clone + 'static) -> BoxedStrategy<String> {
     let delay = prop_oneof![Just(None), (0..40_000_u32).prop_map(Some)];
     // In parts per thousand of the delay: a uniform law reaches √3 of it.
     let jitter = option::of((1..550_u32, any::<bool>(), any::<bool>(), option::of(0.1..0.9)));
@@ -305,7 +299,7 @@ fn link_with(
         .boxed()
 }
 
-fn any_peer(axes: usize) -> impl Strategy<Value = DraftPeer> {
+fn any_peer(axes: usize) -> BoxedStrategy<DraftPeer> {
     let basics = (any::<bool>(), 0..16_u64, contact(axes), 0.02..0.5, 0.0..10.0, gains(4000.0, 10.0), hand());
     let start = (option::weighted(0.4, place(0.02)), option::weighted(0.4, place(0.3)));
     (basics, start)
@@ -324,56 +318,55 @@ fn any_peer(axes: usize) -> impl Strategy<Value = DraftPeer> {
 }
 
 /// Tick [µs], offset \[ns\] and drift [ppb] of each peer: all the same in half of the scenes.
-fn any_clocks(count: usize) -> impl Strategy<Value = Vec<(u64, u64, i32)>> {
+fn any_clocks(count: usize) -> BoxedStrategy<Vec<(u64, u64, i32)>> {
     let tick = || select(&[500_u64, 1000, 2000][..]);
     let offset = prop_oneof![Just(0), Just(1_000_000), 0..3_000_000_u64];
     let drift = prop_oneof![Just(0), -100_000..100_000_i32, Just(100_000_000), Just(-100_000_000)];
-    prop_oneof![tick().prop_map(move |tick| vec![(tick, 0, 0); count]), vec((tick(), offset, drift), count)]
+    prop_oneof![tick().prop_map(move |tick| vec![(tick, 0, 0); count]), vec((tick(), offset, drift), count)].boxed()
 }
 
-fn contact(axes: usize) -> impl Strategy<Value = Contact> + Clone {
+fn contact(axes: usize) -> BoxedStrategy<Contact> {
     let push = (0..axes, any::<bool>()).prop_map(|(axis, positive)| Contact::Push(Direction { axis, positive }));
-    prop_oneof![Just(Contact::Grasp), Just(Contact::None), push]
+    prop_oneof![Just(Contact::Grasp), Just(Contact::None), push].boxed()
 }
 
-fn hand() -> impl Strategy<Value = DraftHand> + Clone {
+fn hand() -> BoxedStrategy<DraftHand> {
     prop_oneof![
         Just(DraftHand::None),
         force(),
         (0.0..0.5, 0.0..20.0, 0.0..200.0, place(0.02))
             .prop_map(|(mass, damping, stiffness, wanted)| DraftHand::Arm { arm: ArmConfig { mass, damping, stiffness }, wanted }),
     ]
+    .boxed()
 }
 
-fn force() -> impl Strategy<Value = DraftHand> + Clone {
+fn force() -> BoxedStrategy<DraftHand> {
     prop_oneof![
         place(2.0).prop_map(DraftHand::Force),
         (place(2.0), 0.0..50.0, -4.0..4.0).prop_map(|(amplitude, frequency, phase)| DraftHand::Sine { amplitude, frequency, phase }),
     ]
+    .boxed()
 }
 
-fn walls() -> impl Strategy<Value = Enclosure> {
+fn walls() -> BoxedStrategy<Enclosure> {
     // They need not hold the origin: then the object is thrown back at once.
-    (place(0.03), 0.001..0.05, 1.0..1000.0, 0.0..20.0).prop_map(|(min, size, stiffness, damping)| Enclosure {
-        min,
-        max: min.map(|end| end + size),
-        stiffness,
-        damping,
-    })
+    (place(0.03), 0.001..0.05, 1.0..1000.0, 0.0..20.0)
+        .prop_map(|(min, size, stiffness, damping)| Enclosure { min, max: min.map(|end| end + size), stiffness, damping })
+        .boxed()
 }
 
-fn integrator() -> impl Strategy<Value = Option<(&'static str, u32)>> {
-    prop_oneof![3 => Just(None), 1 => (select(&["semi-implicit-euler", "rk4"][..]), 1..5_u32).prop_map(Some)]
+fn integrator() -> BoxedStrategy<Option<(&'static str, u32)>> {
+    prop_oneof![3 => Just(None), 1 => (select(&["semi-implicit-euler", "rk4"][..]), 1..5_u32).prop_map(Some)].boxed()
 }
 
-fn gains(stiffness: f64, damping: f64) -> impl Strategy<Value = Gains> + Clone {
-    (0.0..stiffness, 0.0..damping).prop_map(|(stiffness, damping)| Gains { stiffness, damping })
+fn gains(stiffness: f64, damping: f64) -> BoxedStrategy<Gains> {
+    (0.0..stiffness, 0.0..damping).prop_map(|(stiffness, damping)| Gains { stiffness, damping }).boxed()
 }
 
 /// Components up to `size`, and now and then a zero of either sign.
-fn place(size: f64) -> impl Strategy<Value = Place> + Clone {
-    let component = prop_oneof![4 => -size..size, 1 => Just(0.0), 1 => Just(-0.0)];
-    [component.clone(), component.clone(), component]
+fn place(size: f64) -> BoxedStrategy<Place> {
+    let component = prop_oneof![4 => -size..size, 1 => Just(0.0), 1 => Just(-0.0)].boxed();
+    [component.clone(), component.clone(), component].boxed()
 }
 
 #[derive(Clone, Debug)]
@@ -384,7 +377,7 @@ enum Change {
     Gains(Gains),
 }
 
-fn change(count: usize, axes: usize) -> impl Strategy<Value = Change> {
+fn change(count: usize, axes: usize) -> BoxedStrategy<Change> {
     prop_oneof![
         link().prop_filter("a change changes something", |keys| !keys.is_empty()).prop_map(Change::Link),
         (0..count, contact(axes)).prop_map(|(peer, contact)| Change::Contact(peer, contact)),

@@ -7,7 +7,7 @@ use crate::{Draft, DraftLink};
 
 /// Keys of one link, each by itself there or not: delay with jitter, with and without reordering; loss of four models; copies, damage that a checksum finds,
 /// reordering on purpose; a rate with a queue; slots; an outage. It shrinks to fewer keys and smaller numbers.
-pub fn any_link() -> impl Strategy<Value = String> + Clone {
+pub fn any_link() -> BoxedStrategy<String> {
     let law = prop_oneof![Just("uniform"), Just("normal"), Just("gamma"), Just("laplace")];
     // In parts per thousand of the delay: a uniform law reaches √3 of it.
     let delay = weighted(0.7, (0..40_000_u32, weighted(0.5, (1..550_u32, law, any::<bool>()))));
@@ -62,12 +62,14 @@ pub fn any_link() -> impl Strategy<Value = String> + Clone {
 }
 
 /// A link of its own for each direction of each pair of the peers of [`Draft::calm`].
-pub fn any_network(peers: usize) -> impl Strategy<Value = Vec<DraftLink>> {
+pub fn any_network(peers: usize) -> BoxedStrategy<Vec<DraftLink>> {
     let names: Vec<String> = Draft::calm(peers).peers.into_iter().map(|peer| peer.name).collect();
     let pairs: Vec<(String, String)> =
         names.iter().flat_map(|from| names.iter().filter(move |to| *to != from).map(|to| (from.clone(), to.clone()))).collect();
-    proptest::collection::vec(any_link(), pairs.len()).prop_map(move |links| {
-        let both = pairs.iter().zip(links);
-        both.map(|((from, to), keys)| DraftLink { from: from.clone(), to: to.clone(), keys }).collect()
-    })
+    proptest::collection::vec(any_link(), pairs.len())
+        .prop_map(move |links| {
+            let both = pairs.iter().zip(links);
+            both.map(|((from, to), keys)| DraftLink { from: from.clone(), to: to.clone(), keys }).collect()
+        })
+        .boxed()
 }
