@@ -98,9 +98,8 @@ impl Connection {
         segment
     }
 
-    /// Appends a segment with this content to `flight`.
-    pub(super) fn append(&mut self, now: Instant, content: Content, flight: &mut Flight) {
-        let window = self.offer_window();
+    /// Appends a segment with this content, which offers `window`, to `flight`.
+    pub(super) fn append(&mut self, now: Instant, content: Content, window: u16, flight: &mut Flight) {
         if let Some(run) = flight.last()
             && self.is_alike(now, &content, window, &run.segment)
         {
@@ -181,7 +180,7 @@ impl Connection {
 
     /// Returns the length of the selective acknowledgements of the next segment \[byte\].
     pub(super) fn sack_length(&self) -> usize {
-        if !self.receive.has_sack {
+        if !self.has_blocks() {
             return 0;
         }
         let blocks = usize::from(self.receive.duplicate.is_some())

@@ -175,10 +175,13 @@ impl Connection {
     fn is_old(&self, now: Instant, segment: &Segment<'_>) -> bool {
         let (Some((value, _)), Some((recent, at))) = (segment.options.timestamps, self.receive.recent) else { return false };
         let behind = recent.wrapping_sub(value);
+        // The difference wraps: a value from 1 to half of the range means that the segment is older than the timestamp to echo.
+        if !self.receive.has_timestamps || !(1..1 << 31).contains(&behind) {
+            return false;
+        }
         // A pure acknowledgement at the expected number that was overtaken by less than a second is harmless, and refusing the segment would lose its news.
         let is_harmless = segment.sequence_length() == 0 && extend(segment.sequence, self.receive.next) == self.receive.next && behind < 1000;
-        // The difference wraps: a value from 1 to half of the range means that the segment is older than the timestamp to echo.
-        self.receive.has_timestamps && (1..1 << 31).contains(&behind) && !is_harmless && now.saturating_duration_since(at) < TIMESTAMPS_COUNT
+        !is_harmless && now.saturating_duration_since(at) < TIMESTAMPS_COUNT
     }
 
     /// Answers a segment out of window with an acknowledgement of the expected number. The acknowledgement reports the octets that had arrived before.

@@ -45,7 +45,10 @@ impl Connection {
                 Choice::Reply => self.replies.pop_front().into_iter().for_each(|reply| flight.push(reply)),
                 Choice::Reset => flight.push(self.build_reset(now)),
                 Choice::New(end) => return self.transmit_new(now, end, flight),
-                Choice::Segment(content) => self.append(now, content, flight),
+                Choice::Segment(content) => {
+                    let window = self.offer_window();
+                    self.append(now, content, window, flight);
+                }
             }
         }
     }
@@ -53,12 +56,18 @@ impl Connection {
     /// Appends all segments of new data to `flight`. The first one ends at `end`.
     fn transmit_new(&mut self, now: Instant, end: Position, flight: &mut Flight) {
         let was_empty = self.send.board.is_empty();
+        let mut window = self.offer_window();
+        // In units above an octet, the window to offer does not depend on the window that was offered before, so that all segments offer the same.
+        let is_same = self.receive.scale > 0;
         let mut next = Some(end);
         // New data makes no reply, no probe and no repetition due, so that only new data is looked for.
         while let Some(end) = next {
             let content = self.send_new(now, end);
-            self.append(now, content, flight);
+            self.append(now, content, window, flight);
             next = self.next_new(now, false);
+            if next.is_some() && !is_same {
+                window = self.offer_window();
+            }
         }
         // The last segment decides about the timer, and data is an acknowledgement as well.
         self.set_flight_timer(now, was_empty);

@@ -50,6 +50,21 @@ impl Payload<'_> {
         }
     }
 
+    /// Returns the number of octets, without a look at the octets.
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        match &self.0 {
+            Source::Borrowed(octets) => octets.len(),
+            Source::Shared(_, length) => *length,
+        }
+    }
+
+    /// Returns whether the segment has no data.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     /// Returns the number of octets of the data, and of the octets that follow in the memory.
     pub(crate) fn memory_length(&self) -> usize {
         match &self.0 {
