@@ -88,10 +88,10 @@ impl Ticks {
 }
 
 impl<const A: usize> InFlight<A> {
-    /// Returns a wheel without samples. A tick has `tick_nanos` nanoseconds.
-    pub(super) fn new(tick_nanos: u64) -> Self {
+    /// Returns a wheel without samples, for about as many samples as `expected`. A tick has `tick_nanos` nanoseconds.
+    pub(super) fn new(tick_nanos: u64, expected: usize) -> Self {
         let wheel = Box::new([[List::EMPTY; 2]; SPOKES]);
-        Self { ticks: Ticks::new(tick_nanos), packets: Lists::new(Packet::NONE), wheel, beyond: BTreeMap::new() }
+        Self { ticks: Ticks::new(tick_nanos), packets: Lists::new(Packet::NONE, expected), wheel, beyond: BTreeMap::new() }
     }
 
     /// Stores a packet known from the given tick and instant on. `overtakes`: `true` if the packet may arrive before an earlier packet of its link.
@@ -207,7 +207,7 @@ mod tests {
     /// Samples that are on the way for longer than the wheel is wide, and some that are not: all arrive at their tick, those of a link in order.
     #[test]
     fn late_samples_arrive_at_their_tick() {
-        let mut in_flight = InFlight::<1>::new(1);
+        let mut in_flight = InFlight::<1>::new(1, 0);
         let mut count = 0;
         for tick in 0..10_000 {
             let now = (tick, Instant::from_nanos(tick));
@@ -229,7 +229,7 @@ mod tests {
 
     #[test]
     fn packets_of_a_bucket_are_removed() {
-        let mut in_flight = InFlight::<1>::new(10);
+        let mut in_flight = InFlight::<1>::new(10, 0);
         for (arrival, overtakes) in [(1, false), (4, true), (9, false), (10, true), (11, false)] {
             in_flight.push((0, Instant::ZERO), packet(0, 0, arrival), overtakes);
         }
@@ -243,7 +243,7 @@ mod tests {
     /// packets directly before.
     #[test]
     fn a_packet_stands_for_those_that_arrive_with_it() {
-        let mut in_flight = InFlight::<1>::new(1);
+        let mut in_flight = InFlight::<1>::new(1, 0);
         let mut latest = [Latest::NONE; 3];
         let mut push = |now: u64, place: u32, sequence: u32, arrival: u64, waits: bool| {
             let packet = Packet { position: [f64::from(sequence)], ..packet(place, u64::from(sequence), arrival) };

@@ -87,7 +87,9 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
             (Links::Direct(links), Rows::All { peers, .. }) if links.keep_order() => vec![Latest::NONE; receivers.len() * peers * L],
             _ => Vec::new(),
         };
-        let (sends, in_flight) = (vec![false; peers], InFlight::new(nanos(shape.tick)));
+        // Some samples are on the way on each link. The links of the whole scene count, because the receivers of all threads share the caches.
+        let links_of_scene = (0..receivers.len()).map(|receiver| rows.columns(receiver)).sum::<usize>() * L * peers / receivers.len().max(1);
+        let (sends, in_flight) = (vec![false; peers], InFlight::new(nanos(shape.tick), links_of_scene));
         Self { rows, receivers, end: shape.end, links, sends, in_flight, latest, received }
     }
 
