@@ -155,34 +155,38 @@ mod tests {
     /// Number of items of the shortest block.
     const BLOCK: u32 = 1 << SHIFTS[0];
 
-    /// Seven lists that grow and end in turn, at all lengths around a block, against vectors.
+    /// Seven lists that grow and end in turn, at all lengths around a block, against vectors, with short blocks and with long ones.
     #[test]
     fn lists_hold_their_items() {
-        let mut lists = Lists::new(0, 0);
-        let mut all = [(); 7].map(|()| (List::EMPTY, Vec::new()));
-        let mut places = std::collections::BTreeMap::new();
-        for step in 0..20_000_u64 {
-            let number = ((step * 5 + step / 11) % 7) as usize;
-            let (list, expected) = &mut all[number];
-            if expected.len() >= 29 + (step % 40) as usize {
-                assert_eq!(items(&lists, *list), *expected);
-                lists.give_back(std::mem::replace(list, List::EMPTY));
-                expected.clear();
-                places.retain(|_, (other, _)| *other != number);
+        for (expected, shift) in [0, MANY].into_iter().zip(SHIFTS) {
+            let mut lists = Lists::new(0, expected);
+            assert_eq!(lists.shift, shift);
+            let block = 1_u64 << shift;
+            let mut all = [(); 7].map(|()| (List::EMPTY, Vec::new()));
+            let mut places = std::collections::BTreeMap::new();
+            for step in 0..500 * block {
+                let number = ((step * 5 + step / 11) % 7) as usize;
+                let (list, expected) = &mut all[number];
+                if expected.len() as u64 >= block - 3 + step % (block + 8) {
+                    assert_eq!(items(&lists, *list), *expected);
+                    lists.give_back(std::mem::replace(list, List::EMPTY));
+                    expected.clear();
+                    places.retain(|_, (other, _)| *other != number);
+                }
+                let (place, item) = lists.push(list);
+                *item = step;
+                expected.push(step);
+                assert_eq!(places.insert(place, (number, step)), None, "a place has one item");
             }
-            let (place, item) = lists.push(list);
-            *item = step;
-            expected.push(step);
-            assert_eq!(places.insert(place, (number, step)), None, "a place has one item");
+            for (place, (number, item)) in places {
+                assert_eq!(lists.push_unless(true, place, &mut all[number].0), (place, &mut { item }));
+            }
+            for (list, expected) in &all {
+                assert_eq!(items(&lists, *list), *expected);
+            }
+            // Three blocks are the most that one of these lists takes.
+            assert!(lists.following.len() <= 3 * all.len(), "{} blocks", lists.following.len());
         }
-        for (place, (number, item)) in places {
-            assert_eq!(lists.push_unless(true, place, &mut all[number].0), (place, &mut { item }));
-        }
-        for (list, expected) in &all {
-            assert_eq!(items(&lists, *list), *expected);
-        }
-        // Three blocks are the most that one of these lists takes.
-        assert!(lists.following.len() <= 3 * all.len(), "{} blocks", lists.following.len());
     }
 
     #[test]
