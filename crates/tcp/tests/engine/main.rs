@@ -16,7 +16,6 @@ mod fuzz;
 mod recovery;
 mod rows;
 mod smoltcp;
-mod tables;
 mod timing;
 mod traps;
 mod world;

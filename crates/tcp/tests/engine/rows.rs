@@ -1,4 +1,4 @@
-//! Seconds from `connect` to the last octet, beside those of Linux 6.18 over the same links ([`tables`](crate::tables) has all rows and seeds).
+//! Seconds from `connect` to the last octet, beside those of Linux 6.18 over the same links (docs/measured-tcp.md has more links and the quartiles).
 
 use std::time::Duration;
 
