@@ -1,11 +1,12 @@
-//! Rules that the project keeps to: its packages and their licences, the systems on which they build, its loop in real time, the order of its modules, and the
-//! terms of its pages.
+//! Rules that the project keeps to: its packages and their licences, the systems on which they build, its loop in real time, the order of its modules, the
+//! runner of its property tests, and the terms of its pages.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail as tests do")]
 
 mod actions;
 mod dependencies;
 mod metadata;
 mod packages;
+mod properties;
 mod real_time;
 mod rooms;
 mod systems;

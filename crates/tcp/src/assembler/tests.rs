@@ -34,7 +34,7 @@ properties! {
     }
 }
 
-proptest! {
+properties! {
     /// Segments whose data follows each other in memory are read as others, and take the same memory in Linux.
     #[test]
     fn neighbours_in_memory_are_like_others(

@@ -6,6 +6,7 @@ use std::mem::take;
 use std::time::Duration;
 
 use cohaptic_tcp::{CongestionControl, Connection, Ecn, Flags, Flight, Segment, TcpConfig};
+use cohaptic_tests_common::properties;
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 
@@ -111,7 +112,7 @@ fn draws(state: &mut u64, every: u64) -> bool {
     every > 0 && (*state >> 33).is_multiple_of(every)
 }
 
-proptest! {
+properties! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]

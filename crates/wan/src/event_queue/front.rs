@@ -75,12 +75,13 @@ impl Front {
 mod tests {
     use alloc::collections::BTreeSet;
 
+    use cohaptic_tests_common::properties;
     use cohaptic_units::Instant;
     use proptest::prelude::*;
 
     use super::*;
 
-    proptest! {
+    properties! {
         /// A number below 200 is the instant of an entry to insert; each of the other numbers removes the first entry.
         #[test]
         fn entries_come_out_in_order(acts in prop::collection::vec(0_u64..300, 0..500)) {
