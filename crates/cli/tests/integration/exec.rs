@@ -40,6 +40,21 @@ pub(super) fn with_role(desk: &Desk, options: &str, role: &str) -> Command {
     command
 }
 
+/// Sends octets, ends this half of the connection, and returns whether the same octets come back.
+fn data_come_back(mut stream: TcpStream, length: u32) -> bool {
+    let data: Vec<u8> = (0..length).map(|place| u8::try_from(place % 251).unwrap()).collect();
+    let mut sender = stream.try_clone().unwrap();
+    let sent = data.clone();
+    let sending = thread::spawn(move || {
+        sender.write_all(&sent).unwrap();
+        sender.shutdown(Shutdown::Write).unwrap();
+    });
+    let mut back = Vec::new();
+    stream.read_to_end(&mut back).unwrap();
+    sending.join().unwrap();
+    back == data
+}
+
 /// Runs the command inside to its end, and returns what it says.
 pub(super) fn said_by(desk: &Desk, options: &str, role: &str) -> Vec<String> {
     let outcome = Running::begin(with_role(desk, options, role)).end();
@@ -55,20 +70,10 @@ fn be_inside() {
     match words.as_slice() {
         // Connects, sends data, ends its half, and reads what comes back.
         ["echo", to, length] => {
-            let data: Vec<u8> = (0..length.parse().unwrap()).map(|place: u32| u8::try_from(place % 251).unwrap()).collect();
             let begin = Instant::now();
-            let mut stream = TcpStream::connect(*to).unwrap();
+            let stream = TcpStream::connect(*to).unwrap();
             println!("inside: {}", begin.elapsed().as_millis());
-            let mut sender = stream.try_clone().unwrap();
-            let sent = data.clone();
-            let sending = thread::spawn(move || {
-                sender.write_all(&sent).unwrap();
-                sender.shutdown(Shutdown::Write).unwrap();
-            });
-            let mut back = Vec::new();
-            stream.read_to_end(&mut back).unwrap();
-            sending.join().unwrap();
-            println!("inside: {}", if back == data { "the same" } else { "something else" });
+            println!("inside: {}", if data_come_back(stream, length.parse().unwrap()) { "the same" } else { "something else" });
         }
         ["refused", to] => {
             let tcp = TcpStream::connect(*to).unwrap_err();
@@ -113,20 +118,10 @@ fn be_inside() {
                     std::io::copy(&mut stream.try_clone().unwrap(), &mut stream).unwrap();
                     stream.shutdown(Shutdown::Write).unwrap();
                 });
-                let data: Vec<u8> = (0..100_000_u32).map(|place| u8::try_from(place % 251).unwrap()).collect();
                 let begin = Instant::now();
-                let mut stream = TcpStream::connect((*name, to.port())).unwrap();
+                let stream = TcpStream::connect((*name, to.port())).unwrap();
                 let handshake = begin.elapsed().as_millis();
-                let mut sender = stream.try_clone().unwrap();
-                let sent = data.clone();
-                let sending = thread::spawn(move || {
-                    sender.write_all(&sent).unwrap();
-                    sender.shutdown(Shutdown::Write).unwrap();
-                });
-                let mut back = Vec::new();
-                stream.read_to_end(&mut back).unwrap();
-                sending.join().unwrap();
-                println!("inside: {handshake} {}", back == data);
+                println!("inside: {handshake} {}", data_come_back(stream, 100_000));
             }
         }
         // Asks a server of this process by datagrams, without repetitions. Says which questions have an answer, and how many have reached the server, whose
