@@ -30,6 +30,11 @@ pub trait Hands: Send + Sync {
     /// `None` for a page that only watches.
     fn frame(&self, hand: Option<usize>) -> (u64, Arc<str>);
 
+    /// Returns whether hands can be taken yet. A page that connects before is refused with status 503, and connects again. Without an own method: always.
+    fn has_begun(&self) -> bool {
+        true
+    }
+
     /// Takes the free hand `wanted`, or any free hand for `None`. Returns the number of the hand.
     ///
     /// # Errors

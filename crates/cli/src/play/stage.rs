@@ -172,6 +172,10 @@ impl Hands for PlayStage {
         self.frames.text(hand)
     }
 
+    fn has_begun(&self) -> bool {
+        self.running().is_ok()
+    }
+
     fn take_hand(&self, wanted: Option<usize>) -> Result<usize, String> {
         let part = self.running()?;
         let mut taken = lock(&self.taken);

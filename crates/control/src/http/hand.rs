@@ -55,6 +55,10 @@ pub(super) async fn connect(
 ) -> Result<Response, Refusal> {
     let hands = app.hands()?;
     check_origin(request.headers())?;
+    // A page that is told of no hand looks on from then on, which a page that is only too early must not.
+    if !hands.has_begun() {
+        return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "the session has not begun: ask again"));
+    }
     let wanted = match (&app.people, visitor) {
         (People::Study(_), Visitor::Guest(person)) => Wanted::One(person),
         (People::Study(_), Visitor::Host) => Wanted::None,

@@ -2,6 +2,7 @@
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -19,6 +20,8 @@ const ORIGIN: &str = "http://evil.example";
 struct Recorder {
     told: Mutex<Vec<String>>,
     news: Mutex<(u64, String)>,
+    /// Whether no hand can be taken yet.
+    is_early: AtomicBool,
 }
 
 impl Recorder {
@@ -38,6 +41,10 @@ impl Recorder {
 impl Hands for Recorder {
     fn frame(&self, _: Option<usize>) -> (u64, Arc<str>) {
         (1, r#"{"peers":[]}"#.into())
+    }
+
+    fn has_begun(&self) -> bool {
+        !self.is_early.load(Ordering::Relaxed)
     }
 
     fn take_hand(&self, wanted: Option<usize>) -> Result<usize, String> {
@@ -183,6 +190,15 @@ fn everybody_may_ask_for_the_own_things_alone() {
     lab.guests.set(vec![Token::random().unwrap()]);
     assert_eq!(lab.ask(&person, "GET", "/join", "").0, 401);
     assert_eq!(lab.ask(&lab.person(0), "GET", "/join", "").0, 200);
+}
+
+#[test]
+fn a_page_that_is_too_early_takes_the_hand_later() {
+    let lab = Lab::new();
+    lab.study.is_early.store(true, Ordering::Relaxed);
+    assert_eq!(lab.connect(&lab.person(1), None).err(), Some(503));
+    lab.study.is_early.store(false, Ordering::Relaxed);
+    assert_eq!(text(&mut lab.connect(&lab.person(1), None).unwrap()).unwrap(), r#"{"hand":1}"#);
 }
 
 #[test]
