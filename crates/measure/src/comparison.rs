@@ -156,9 +156,12 @@ impl Comparison {
 /// Judges a share against the probability `share`. The result shows `asked` and `shown`, or the achieved share for `shown` of `None`.
 fn of_share(name: &str, share: f64, asked: f64, happened: &[f64], shown: Option<f64>) -> Figure {
     let achieved = series::mean(happened);
-    // The variance of the asked probability, because an achieved share of zero would have no variance.
+    // The variance of the asked probability, because an achieved share of zero would have no variance. The error by batches is scaled to this variance too: a
+    // series with too few events has an error that is too small, and would be told apart from what was asked too often.
     let independent = (share * (1.0 - share) / count(happened.len().max(1))).sqrt();
-    let error = worst(batches::batch_standard_error(happened), Some(independent));
+    let found = achieved.map_or(0.0, |achieved| (achieved * (1.0 - achieved) / count(happened.len())).sqrt());
+    let batches = batches::batch_standard_error(happened).map(|error| if found > 0.0 { error * (independent / found) } else { error });
+    let error = worst(batches, Some(independent));
     let judged = figure(name, share, achieved, error, 1e-12);
     Figure { asked, achieved: shown.or(achieved), ..judged }
 }

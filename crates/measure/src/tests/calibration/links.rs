@@ -12,7 +12,7 @@ use crate::comparison::{Comparison, Figure};
 use crate::steady::SteadyStream;
 use crate::tests::TestRng;
 
-const LINKS: u64 = 240;
+const LINKS: u64 = 300;
 const STREAM: SteadyStream =
     SteadyStream { packets: 3_000, every: Duration::from_millis(1), info: PacketInfo { size: Bytes::new(64), ecn: Ecn::NotCapable } };
 
