@@ -103,7 +103,7 @@ fn is_of(path: &str, key: &str) -> bool {
 fn documents_have_the_keys_of_the_page_and_no_other() {
     for document in DOCUMENTS.into_iter().flatten() {
         let keys = keys(document.rows);
-        let mut all = BTreeSet::new();
+        let (mut all, mut documents) = (BTreeSet::new(), String::new());
         for line in document.lines {
             let folder = Folder::new();
             let is_in_namespaces = document.command == "router" || document.command.starts_with("exec");
@@ -116,12 +116,13 @@ fn documents_have_the_keys_of_the_page_and_no_other() {
             let begin = printed.find('{').unwrap_or_else(|| panic!("{line}: no document: {printed}"));
             let value: Value = serde_json::from_str(&printed[begin..]).unwrap_or_else(|error| panic!("{line}: {error}: {printed}"));
             paths("", &value, &mut all);
+            documents += &printed;
         }
         // A second document within the first has the same keys.
         all.retain(|path| path != "schema" && path != "version" && !path.starts_with("against."));
         for path in &all {
             let is_list = keys.iter().any(|key| key.strip_prefix(path.as_str()).is_some_and(|rest| rest.starts_with("[]") || rest.starts_with('.')));
-            assert!(is_list || keys.iter().any(|key| is_of(path, key)), "{}: the page has no key {path}", document.command);
+            assert!(is_list || keys.iter().any(|key| is_of(path, key)), "{}: the page has no key {path}: {documents}", document.command);
         }
         let is_seen =
             |key: &String| all.is_empty() || key == "against" || all.iter().any(|path| is_of(path, key) || path.starts_with(&format!("{key}.")));
