@@ -1,20 +1,17 @@
-//! Tests of the catalogue of keys against readers and pages, and of the JSON Schema against files.
+//! Tests of the catalogue of keys against readers and pages. `python/tests/test_schema.py` tests the JSON Schemas against files.
 
 mod samples;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
-use cohaptic_linkfile::document::{Node, Value as DocumentValue};
+use cohaptic_linkfile::document::{Node, Value};
 use cohaptic_linkfile::schema::link::LINK_TABLE;
 use cohaptic_linkfile::schema::{Form, Table};
-use serde_json::{Map, Value, json};
-use toml::de::{DeTable, DeValue};
+use toml::de::DeTable;
 
-use samples::{SCENES, read, root, samples};
+use samples::{read, root, samples};
 
 use super::FileSchema;
-use crate::Scene;
 
 /// Returns every table of the catalogue once, with a path to the table for messages. The map is indexed by address, because several keys share a table.
 fn tables() -> BTreeMap<*const Table, (String, &'static Table)> {
@@ -44,9 +41,9 @@ fn tables() -> BTreeMap<*const Table, (String, &'static Table)> {
 /// Returns the path of every table of a document.
 fn paths(node: &Node) -> Vec<&str> {
     match &node.value {
-        DocumentValue::Table(table) => core::iter::once(node.path.as_str()).chain(table.0.iter().flat_map(|entry| paths(&entry.node))).collect(),
-        DocumentValue::List(elements) => elements.iter().flat_map(|element| paths(element)).collect(),
-        DocumentValue::Text(_) | DocumentValue::Integer(_) | DocumentValue::Float(_) | DocumentValue::Boolean(_) | DocumentValue::Date => Vec::new(),
+        Value::Table(table) => core::iter::once(node.path.as_str()).chain(table.0.iter().flat_map(|entry| paths(&entry.node))).collect(),
+        Value::List(elements) => elements.iter().flat_map(|element| paths(element)).collect(),
+        Value::Text(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) | Value::Date => Vec::new(),
     }
 }
 
@@ -74,87 +71,6 @@ fn readers_take_every_key_that_is_declared() {
     }
     for (table, (way, declared)) in tables().into_iter().filter(|(_, (_, declared))| declared.others.is_none()) {
         assert_eq!(Some(&keys(declared)), taken.get(&table), "{way}");
-    }
-}
-
-/// Returns a TOML document as JSON, for the validator.
-fn json_of(text: &str) -> Value {
-    fn table(fields: &DeTable<'_>) -> Value {
-        Value::Object(fields.iter().map(|(key, field)| (key.get_ref().to_string(), value(field.get_ref()))).collect::<Map<_, _>>())
-    }
-    fn value(found: &DeValue<'_>) -> Value {
-        match found {
-            DeValue::String(text) => json!(text),
-            DeValue::Integer(integer) => json!(i64::from_str_radix(integer.as_str(), integer.radix()).unwrap()),
-            DeValue::Float(float) => json!(float.as_str().parse::<f64>().unwrap()),
-            DeValue::Boolean(boolean) => json!(boolean),
-            DeValue::Datetime(date) => json!(date.to_string()),
-            DeValue::Array(elements) => elements.iter().map(|element| value(element.get_ref())).collect(),
-            DeValue::Table(fields) => table(fields),
-        }
-    }
-    table(DeTable::parse(text).unwrap().get_ref())
-}
-
-#[test]
-fn the_json_schemas_are_sound_and_take_every_sample() {
-    let samples = samples();
-    for kind in FileSchema::ALL {
-        let schema = kind.json();
-        assert!(jsonschema::draft7::meta::is_valid(&schema), "{kind:?}");
-        let validator = jsonschema::draft7::new(&schema).unwrap();
-        for sample in samples.iter().filter(|sample| sample.kind == kind) {
-            let errors: Vec<String> =
-                validator.iter_errors(&json_of(&sample.text)).map(|error| format!("{}: {error}", error.instance_path())).collect();
-            assert!(errors.is_empty(), "{}: {errors:#?}", sample.path.display());
-        }
-    }
-}
-
-#[test]
-#[ignore = ".ci/nightly runs it: it takes long"]
-fn the_json_schemas_refuse_what_the_readers_refuse_wherever_it_stands() {
-    let samples = samples();
-    for sample in &samples {
-        let validator = jsonschema::draft7::new(&sample.kind.json()).unwrap();
-        let whole = json_of(&sample.text);
-        for (pointer, count) in objects(&whole) {
-            let mut spoilt = whole.clone();
-            let object = spoilt.pointer_mut(&pointer).and_then(Value::as_object_mut).unwrap();
-            object.insert("no-such-key".to_owned(), json!({ "no-such-key": 1 }));
-            assert!(!validator.is_valid(&spoilt), "{}: an unknown key in {pointer}, which has {count}", sample.path.display());
-        }
-    }
-    let validator = jsonschema::draft7::new(&FileSchema::Scene.json()).unwrap();
-    for (of, by) in [
-        ("mass = 1, enclosure", "mass = -1, enclosure"),
-        ("mass = 1, enclosure", "mass = \"1kg\", enclosure"),
-        ("\"average-position\"", "\"average\""),
-        ("duration = \"4s\"", "duration = 4"),
-        ("duration = \"4s\"", "duration = \"4\""),
-        ("duration = \"4s\"", "title = \"x\""),
-        ("stages = 2", "stages = 2.5"),
-        ("loss = \"5%\"", "loss = 1.5"),
-    ] {
-        let text = SCENES[0].replacen(of, by, 1);
-        assert_ne!(text, SCENES[0]);
-        assert!(Scene::parse(&text, Path::new("x.toml"), &[]).is_err(), "{by}");
-        assert!(!validator.is_valid(&json_of(&text)), "{by}");
-    }
-}
-
-/// Returns the JSON pointer of every object within a value, with the number of its members.
-fn objects(value: &Value) -> Vec<(String, usize)> {
-    let within = |name: String, inner: &Value| {
-        objects(inner).into_iter().map(move |(pointer, count)| (format!("/{name}{pointer}"), count)).collect::<Vec<_>>()
-    };
-    match value {
-        Value::Object(members) => {
-            let inner = members.iter().flat_map(|(name, inner)| within(name.clone(), inner));
-            core::iter::once((String::new(), members.len())).chain(inner).collect()
-        }
-        Value::Array(elements) => elements.iter().enumerate().flat_map(|(place, inner)| within(place.to_string(), inner)).collect(),
-        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => Vec::new(),
     }
 }
 
