@@ -64,7 +64,7 @@ impl Outgoing {
 pub struct JoinedPeer {
     client: Client,
     peer: Peer<3, JoinedDevice, BuiltInStrategy<3>>,
-    /// Scene with the kind of this peer at this computer, and with a regular clock.
+    /// Scene with the kind of this peer at this computer.
     scene: Scene,
     place: usize,
     clock: Clock,
@@ -138,11 +138,11 @@ impl JoinedPeer {
     /// # Panics
     ///
     /// If `place` is no peer of the scene.
-    pub fn new(mut scene: Scene, place: usize, config: JoinedConfig, device: Option<Box<dyn cohaptic_device::Device>>) -> Result<Self, Unfit> {
+    pub fn new(scene: Scene, place: usize, config: JoinedConfig, device: Option<Box<dyn cohaptic_device::Device>>) -> Result<Self, Unfit> {
         check(&scene, place)?;
-        // The clock of this computer is what it is: a clock in the scene stands for it in virtual time.
+        // The clock of this computer is what it is: a clock in the scene stands for it in virtual time. The scene keeps its clocks, because automatic
+        // parameters of the law are those of the session, whose peers may all have the same offset and drift.
         let clock = Clock::regular(scene.peers[place].clock.tick);
-        scene.peers[place].clock = clock;
         let spec = &scene.peers[place];
         let start = scene.initial_device(place);
         let (in_hand, device) = match device {

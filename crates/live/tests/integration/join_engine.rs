@@ -42,6 +42,12 @@ fn a_clock_in_the_scene_changes_no_tick_of_a_joined_peer() {
     let regular = rows(&[]);
     assert_eq!(regular.len(), 201);
     assert_eq!(rows(&["peers.left.clock={ offset = \"3ms\", drift = \"20000ppm\" }"]), regular);
+    // Automatic parameters need clocks that are alike, as the clocks of this scene are.
+    for law in ["local-damping", "local-lag"] {
+        let strategy = format!("coordination.strategy=\"{law}\"");
+        let regular = rows(&[&strategy]);
+        assert_eq!(rows(&[&strategy, "peer.clock={ offset = \"3ms\", drift = \"20000ppm\" }"]), regular, "{law}");
+    }
 }
 
 #[test]
