@@ -175,8 +175,10 @@ pub(super) fn trials(arguments: &ExecArguments, plan: &Plan, trials: &Trials) ->
     }
     if trials.packets == 0 {
         line("no packet has passed a link");
-        // A file of hosts has no option for the loopback, and its hosts have names.
-        if !arguments.command.is_empty() && !arguments.loopback {
+        // A file of hosts has no option for the loopback, and in a file without a world no host has the name `host`.
+        if arguments.command.is_empty() {
+            line(&format!("hosts reach each other by their names, as in http://{}:8000", plan.hosts[0].name));
+        } else if !arguments.loopback {
             line("with --loopback, packets of the command to localhost pass a link too. A server beside the command has the name host, as in");
             line("  -- env SERVER=http://host:8000 COMMAND");
         }

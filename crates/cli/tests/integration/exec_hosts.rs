@@ -144,6 +144,7 @@ fn a_file_may_have_the_real_world() {
 #[test]
 fn a_bad_file_is_refused_with_its_place() {
     let desk = Desk::new();
+    let (two, link) = (net("command = \"true\"", "command = \"true\""), "[[links]]\nfrom = \"server\"\nto = \"client\"\n");
     for (text, parts) in [
         (net("command = \"true\"", "command = \"\""), &["net.toml:6:11: hosts.1.command: there is no command: expected a line for sh"][..]),
         (net("command = \"true\"", "command = [\"true\", 1]"), &["hosts.1.command.1", "a word of the command"]),
@@ -154,6 +155,10 @@ fn a_bad_file_is_refused_with_its_place() {
         ("[[hosts]]\nname = \"alone\"\ncommand = \"true\"\n".to_owned(), &["one host alone has no link", "world = \"world\""]),
         ("[exec]\nworld = \"a\"\n[[hosts]]\nname = \"a\"\ncommand = \"true\"\n".to_owned(), &["there is a host \"a\" already"]),
         (net("command = \"true\"", "comand = \"true\""), &["comand", "did you mean \"command\"?"]),
+        (format!("{two}trace = 3\n"), &["expected the name of a recording, relative to the folder of this file"]),
+        (format!("{two}trace = \"none.csv\"\n"), &["cannot read none.csv", "expected a file, relative to the folder of this file"]),
+        (format!("{two}{link}{link}"), &["expected one entry for each direction between two hosts"]),
+        (format!("{two}[[links]]\nfrom = \"client\"\nto = \"sever\"\n"), &["there is no host \"sever\"", "did you mean \"server\"?"]),
     ] {
         desk.write("net.toml", &text);
         desk.cohaptic_within(PATIENCE, "exec net.toml").assert_refused(125, parts);

@@ -94,6 +94,13 @@ fn a_search_says_what_is_not_due_to_lost_packets() {
     assert!(outcome.stdout.contains("the command passes with 3 seeds\nno packet has passed a link"), "{}", outcome.stdout);
     let outcome = desk.cohaptic("exec 'delay 1ms loss 1%' --loopback --runs 1 --no-priority -- true");
     assert_eq!(outcome.stdout, "run 1: passes, lost nothing\nthe command passes 1 of 1 times\nno packet has passed a link\n");
+    desk.write("net.toml", net("command = \"true\"", "command = \"true\""));
+    let outcome = desk.cohaptic("exec net.toml --runs 1 --no-priority");
+    assert!(
+        outcome.stdout.ends_with("no packet has passed a link\nhosts reach each other by their names, as in http://server:8000\n"),
+        "{}",
+        outcome.stdout
+    );
 
     let mut command =
         desk.command("exec 'delay 1ms' --runs 100 --no-priority -- sh -c 'echo ready >>said; sleep 0.1; [ $(wc -l <said) -lt 3 ] || sleep 1000'");

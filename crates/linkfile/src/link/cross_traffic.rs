@@ -54,6 +54,6 @@ fn read_on_off(node: &Node, context: Context<'_>) -> Option<CrossTraffic> {
 
 /// Reads a recording of cross-traffic with a path relative to the folder of the document.
 fn read_recording(node: &Node, context: Context<'_>) -> Option<CrossRecording> {
-    let path = file_path(node, context, "the name of a CSV with the columns t,bytes, relative to the folder of the scene")?;
+    let path = file_path(node, context, "the name of a CSV with the columns t,bytes, relative to the folder of this file")?;
     read_file(node, context, &path, "cross-traffic", |text| CrossRecording::parse(text).map_err(|error| Fault::in_line(text, error.line(), &error)))
 }

@@ -22,10 +22,10 @@ pub(super) fn read_distribution(node: &Node, context: Context<'_>) -> Option<Dis
     table.finish();
     let file = only_one(node, context, &files, EXPECTED)?;
     if file.name == "table" {
-        let path = file_path(&file.node, context, "the name of a .dist file, relative to the folder of the scene")?;
+        let path = file_path(&file.node, context, "the name of a .dist file, relative to the folder of this file")?;
         return read_file(&file.node, context, &path, "dist", dist_table).map(Distribution::Table);
     }
-    let path = file_path(&file.node, context, "the name of a CSV file, relative to the folder of the scene")?;
+    let path = file_path(&file.node, context, "the name of a CSV file, relative to the folder of this file")?;
     read_file(&file.node, context, &path, "delays", empirical).map(Distribution::Empirical)
 }
 

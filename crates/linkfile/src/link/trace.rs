@@ -23,7 +23,7 @@ pub(super) enum Trace {
     Path(PathTrace),
 }
 
-const FILE: &str = "the name of a recording, relative to the folder of the scene";
+const FILE: &str = "the name of a recording, relative to the folder of this file";
 
 /// Reads a recording: the name of a file, or a table. Returns `Some(None)` for "none".
 pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Trace>> {
@@ -169,7 +169,7 @@ fn first_row_span(text: &str) -> core::ops::Range<usize> {
 
 /// Reads a log of fates with a path relative to the folder of the document.
 pub(super) fn read_replay(node: &Node, context: Context<'_>) -> Option<Arc<FateLog>> {
-    let path = file_path(node, context, "the name of a log of fates, relative to the folder of the scene")?;
+    let path = file_path(node, context, "the name of a log of fates, relative to the folder of this file")?;
     read_file(node, context, &path, "fates", |text| FateLog::parse(text).map(Arc::new).map_err(|error| fault(text, &error)))
 }
 

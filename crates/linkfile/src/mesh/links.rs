@@ -16,7 +16,7 @@ use super::selector::{LinkSelector, read_ends};
 use crate::document::{BEGINNING, Node};
 use crate::link::keys::LINK_ENTRY;
 use crate::link::{is_empty, read_link, read_link_of};
-use crate::reading::{Context, Modulators, TableReader, values};
+use crate::reading::{Context, Modulators, Names, TableReader, values};
 
 /// Classes of links at some instant of the timeline.
 #[derive(Clone, Debug)]
@@ -113,7 +113,8 @@ fn read_entry(
     };
     let ends = ends?;
     if !seen.insert(ends) {
-        context.fault_at(to?, "there is an entry for this link already: expected one entry for each pair of peers");
+        let noun = context.names.map_or("peer", Names::noun);
+        context.fault_at(to?, format!("there is an entry for this link already: expected one entry for each direction between two {noun}s"));
         return None;
     }
     Some((ends, class?))

@@ -156,7 +156,7 @@ impl<'a> Context<'a> {
 
     /// Reports that the file named by `node` cannot be read.
     pub(super) fn unreadable(&self, node: &Node, path: PathBuf, source: io::Error) {
-        let message = format!("cannot read {}: {source}: expected a file, relative to the folder of the scene", path.display());
+        let message = format!("cannot read {}: {source}: expected a file, relative to the folder of this file", path.display());
         self.faults.report(node.place, || {
             let place = self.sources.diagnostic(node.place, node.path.clone(), message);
             FileError::Read { path, source, place: Some(Box::new(place)) }

@@ -58,7 +58,7 @@ fn split_path(text: &str, source: usize) -> Result<Vec<Segment<'_>>, Refused> {
         let begin = start + (part.len() - part.trim_start().len());
         let name = trimmed.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).unwrap_or(trimmed);
         if name.is_empty() || segments.len() == MOST {
-            let message = "the key is not a dotted path: expected one such as coordination.stiffness or peers.left.contact".to_owned();
+            let message = "the key is not a dotted path: expected one such as link.delay".to_owned();
             return Err(Refused { span: begin..begin + trimmed.len(), key: text.trim().to_owned(), message });
         }
         segments.push(Segment { name, place: Place::new(source, begin..begin + trimmed.len()) });
