@@ -7,10 +7,11 @@ use alloc::vec::Vec;
 use cohaptic_units::Instant;
 
 use super::{Scoreboard, SentAt};
+use crate::sequence::Position;
 
 impl Scoreboard {
     /// Marks the segment at `index` as lost and queues it to be sent again. A segment that was sent again is lost a second time.
-    fn mark_lost(&mut self, index: usize) {
+    pub(super) fn mark_lost(&mut self, index: usize) {
         let sent = &mut self.queue[index];
         if sent.again {
             sent.again = false;
@@ -38,9 +39,8 @@ impl Scoreboard {
     /// Returns the instant at which all other segments sent before `delivered` are lost, or `None` if no other segment is left.
     pub(crate) fn detect_by_time(&mut self, now: Instant, delivered: SentAt, patience: Duration) -> Option<Instant> {
         self.keep_times();
-        while let Some(&(sent_at, start)) = self.by_time.front() {
-            let index = self.index(start).filter(|index| self.is_undecided(*index, sent_at));
-            if let Some(index) = index {
+        while let Some(&(sent_at, end)) = self.by_time.front() {
+            if let Some(index) = self.undecided(sent_at, end) {
                 // Entries ascend in time: from here on, every transmission is later than `delivered`.
                 if sent_at >= delivered {
                     return None;
@@ -59,10 +59,11 @@ impl Scoreboard {
         Some(last.0.0.saturating_add(patience))
     }
 
-    /// Returns whether `sent_at` is the last transmission of the segment at `index`, and the fate of this transmission is unknown.
-    fn is_undecided(&self, index: usize, sent_at: SentAt) -> bool {
+    /// Returns the index of the segment that ends at `end` if `sent_at` is its last transmission, and the fate of this transmission is unknown.
+    fn undecided(&self, sent_at: SentAt, end: Position) -> Option<usize> {
+        let index = self.index(end - 1)?;
         let sent = &self.queue[index];
-        (sent.at, sent.order) == sent_at && !sent.sacked && (!sent.lost || sent.again)
+        ((sent.at, sent.order) == sent_at && !sent.sacked && (!sent.lost || sent.again)).then_some(index)
     }
 
     /// Marks as lost each segment that was never sent again and has at least `duplicates` later segments sacked (`IsLost` of RFC 6675).
@@ -92,7 +93,7 @@ impl Scoreboard {
     }
 
     /// Marks all segments that have not arrived as lost, after the retransmission timer has run out. With `patience`, segments that were sent less than
-    /// `patience` before `now` are spared (RFC 8985, section 6.3), except for the first segment.
+    /// `patience` before `now` are spared (RFC 8985, section 6.3), except for the first segment, and unless the receiver has dropped sacked data.
     pub(crate) fn mark_all_lost(&mut self, now: Instant, patience: Option<Duration>, has_sack: bool) {
         // The receiver acknowledges in order, so the first unacknowledged segment cannot have arrived unless the receiver has dropped the segment again.
         let has_reneged = self.queue.front().is_some_and(|first| first.sacked);
@@ -103,6 +104,8 @@ impl Scoreboard {
             self.sacked_out = 0;
             self.queue.iter_mut().for_each(|sent| sent.sacked = false);
         }
+        // After dropped data, Linux spares no segment: the search by time has forgotten the transmissions of the segments that counted as sacked.
+        let patience = patience.filter(|_| !has_reneged);
         for index in 0..self.queue.len() {
             let sent = &self.queue[index];
             let is_recent = index > 0 && patience.is_some_and(|patience| sent.at.saturating_add(patience) > now);
@@ -118,7 +121,7 @@ impl Scoreboard {
         self.lost_out = 0;
         self.queue.iter_mut().for_each(|sent| sent.lost = false);
         // Loss detection has dropped the entries of lost segments from `by_time`. All segments on the way need an entry again.
-        let mut by_time: Vec<_> = self.queue.iter().filter(|sent| !sent.sacked).map(|sent| ((sent.at, sent.order), sent.start)).collect();
+        let mut by_time: Vec<_> = self.queue.iter().filter(|sent| !sent.sacked).map(|sent| ((sent.at, sent.order), sent.end)).collect();
         by_time.sort_unstable();
         (self.by_time, self.keeps_times) = (by_time.into(), true);
     }

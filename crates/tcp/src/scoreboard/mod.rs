@@ -3,6 +3,8 @@
 
 mod loss;
 mod news;
+#[cfg(test)]
+mod tests;
 
 use alloc::collections::{BTreeSet, VecDeque};
 use alloc::vec::Vec;
@@ -53,8 +55,8 @@ const FIRST: usize = 16;
 pub(crate) struct Scoreboard {
     /// Segments in the order of positions. Each segment begins where the segment before ends.
     queue: VecDeque<Sent>,
-    /// Transmissions in the order of time, with the start of their segment. An entry stays after its segment was sent again or has arrived; readers skip old
-    /// entries. Empty unless `keeps_times` is set.
+    /// Transmissions in the order of time, with the end of their segment, which never changes: an acknowledgement moves only the start. An entry stays after
+    /// its segment was sent again or has arrived; readers skip old entries. Empty unless `keeps_times` is set.
     by_time: VecDeque<(SentAt, Position)>,
     /// `false` as long as `by_time` would have one entry for each segment of `queue`, in the order of `queue`, as in a transfer without losses.
     keeps_times: bool,
@@ -111,24 +113,24 @@ impl Scoreboard {
             self.queue.reserve(FIRST);
         }
         if self.keeps_times {
-            self.by_time.push_back(((at, order), start));
+            self.by_time.push_back(((at, order), end));
         }
         self.queue.push_back(Sent { start, end, at, order, sacked: false, lost: false, again: false, ever_again: false, ending });
     }
 
-    /// Fills `by_time`, unless `by_time` is filled already. Called before a search by time, and before the order of transmissions or the start of a segment
-    /// changes.
+    /// Fills `by_time`, unless `by_time` is filled already. Called before a search by time, and before a segment is sent again, which changes the order of
+    /// transmissions.
     fn keep_times(&mut self) {
         if !self.keeps_times {
             self.keeps_times = true;
-            self.by_time.extend(self.queue.iter().map(|sent| ((sent.at, sent.order), sent.start)));
+            self.by_time.extend(self.queue.iter().map(|sent| ((sent.at, sent.order), sent.end)));
         }
     }
 
-    /// Returns the index in `queue` of the segment that contains `start`.
-    fn index(&self, start: Position) -> Option<usize> {
+    /// Returns the index in `queue` of the segment that contains `position`.
+    fn index(&self, position: Position) -> Option<usize> {
         // The ends ascend, because the segments follow each other without gaps.
-        let index = self.queue.partition_point(|sent| sent.end <= start);
+        let index = self.queue.partition_point(|sent| sent.end <= position);
         (index < self.queue.len()).then_some(index)
     }
 
@@ -165,7 +167,7 @@ impl Scoreboard {
             return;
         };
         // Entries of removed segments are dropped at the front. Entries further back are skipped when they come to the front.
-        while self.by_time.front().is_some_and(|(_, start)| *start < first.start) {
+        while self.by_time.front().is_some_and(|(_, end)| *end <= position) {
             self.by_time.pop_front();
         }
         if first.start < position {
@@ -176,7 +178,6 @@ impl Scoreboard {
     /// Removes the octets below `position` from the first segment, because an acknowledgement ends inside the segment.
     #[cold]
     fn cut_first(&mut self, position: Position) {
-        self.keep_times();
         let Some(first) = self.queue.front_mut() else { return };
         // `to_send` is keyed by the start of the segment.
         if self.to_send.remove(&first.start) {
@@ -260,7 +261,7 @@ impl Scoreboard {
             self.again_out += u32::from(!sent.again);
             sent.again = true;
         }
-        self.by_time.push_back(((at, self.transmissions), sent.start));
+        self.by_time.push_back(((at, self.transmissions), sent.end));
     }
 
     /// Returns whether a repeated segment is on the way or is the first unacknowledged segment.
