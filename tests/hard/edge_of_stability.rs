@@ -1,4 +1,4 @@
-//! Gains a ten-thousandth below and above the edge of stability, for a million ticks: the simulation decays and grows by the spectral radius, frame by frame.
+//! Gains a ten-thousandth below and above the edge of stability, for a million ticks, by day for a quarter of them: the simulation decays and grows by the spectral radius, frame by frame.
 //!
 //! With w a left eigenvector of the tick's matrix A, w·A = λ·w, the component c = w·s of the state obeys c⁺ = λ·c, however little else has died out. What comes
 //! between, per frame and relative to |c|, is at most
@@ -16,13 +16,15 @@
 use cohaptic_harness::{Model, Simulation, TickRow};
 use cohaptic_peer::{Contact, Gains};
 use cohaptic_stability::{Boundary, BoundaryOptions, Cell, KeyRange, Method, Monodromy, StateKind, Verdict, analyse, monodromy};
-use cohaptic_tests::Draft;
+use cohaptic_tests::{Draft, quarter_by_day};
 
 use crate::eigenvectors::{LeftEigenvector, left_eigenvectors};
 use crate::hard::ROUNDING;
 use crate::hard::watch::OnTick;
 
-const TICKS: usize = 1_000_000;
+fn ticks() -> usize {
+    quarter_by_day(1_000_000) as usize
+}
 
 /// One peer at a tick: its copy and its device; the other peer's are the same with the opposite sign.
 #[derive(Clone, Copy, Default)]
@@ -33,7 +35,7 @@ struct Row {
 
 /// Two peers that begin as mirror images and stay so to the bit: the common motion is zero, and a decay has no floor.
 fn mirrored() -> Draft {
-    let mut draft = Draft { duration: TICKS as u64, ..Draft::calm(2) };
+    let mut draft = Draft { duration: ticks() as u64, ..Draft::calm(2) };
     for (peer, x) in draft.peers.iter_mut().zip([0.01, -0.01]) {
         peer.position = Some([x, 0.0, 0.0]);
     }
@@ -67,7 +69,7 @@ fn edge(scene: fn(f64) -> Draft, low: f64, high: f64) -> f64 {
 }
 
 fn run(draft: &Draft) -> Vec<Row> {
-    let mut rows = vec![Row::default(); TICKS];
+    let mut rows = vec![Row::default(); ticks()];
     let mut tick = 0;
     let Ok(_) = Simulation::new(&draft.scene(), Model::Least).run(&mut OnTick(|row: &TickRow<'_>| {
         let here = Row { object: (row.object.position[0], row.object.velocity[0]), device: (row.device.position[0], row.device.velocity[0]) };
@@ -79,7 +81,7 @@ fn run(draft: &Draft) -> Vec<Row> {
             tick += 1;
         }
     }));
-    assert_eq!(tick, TICKS);
+    assert_eq!(tick, rows.len());
     rows
 }
 
@@ -135,12 +137,12 @@ fn grows_by_its_radius(draft: &Draft, expected: Verdict) {
     let mut between = 0.0;
     let mut last = 0.0;
     let first = component(&left, &state(&matrix, &rows, begin));
-    for tick in begin..TICKS {
+    for tick in begin..rows.len() {
         let state = state(&matrix, &rows, tick);
         last = component(&left, &state);
         between += per_frame * state.iter().fold(0.0, |size: f64, entry| size.max(entry.abs())) / (modulus * last);
     }
-    let frames = (TICKS - 1 - begin) as f64;
+    let frames = (rows.len() - 1 - begin) as f64;
     let (growth, tolerance) = (libm::log(last / first) / frames, 1.001 * between / frames);
     // ln(ρ ± e) = ln ρ ± e/ρ; the eigenvalue itself is off by its residual, which is in the sum.
     let apart = (growth - libm::log(radius.value)).abs();

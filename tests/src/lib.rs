@@ -38,6 +38,12 @@ pub fn are_all() -> bool {
     std::env::var_os(ALL_CASES_VARIABLE).is_some()
 }
 
+/// Returns `all` ticks, packets or milliseconds of a test if [`ALL_CASES_VARIABLE`] is set, and a quarter of them otherwise.
+#[must_use]
+pub fn quarter_by_day(all: u64) -> u64 {
+    if are_all() { all } else { all.div_ceil(4) }
+}
+
 /// A property test that leaves no files behind. It draws `count` cases if [`ALL_CASES_VARIABLE`] is set, and the first quarter of them otherwise.
 #[must_use]
 pub fn cases(count: u32) -> ProptestConfig {
