@@ -157,12 +157,19 @@ impl<E: Event> EventQueue<E> {
         self.push_calendar(event);
     }
 
-    /// Adds an event at the instant `at`. `make` constructs the event in its final place, so no large value is moved. `follows` tells whether the key of
-    /// the event is at least the key of another event.
+    /// Returns the event pushed last, or `None` if the queue is empty or a calendar.
     #[inline(always)]
-    pub(crate) fn push_made(&mut self, at: Instant, follows: impl FnOnce(&E) -> bool, make: impl FnOnce() -> E) {
+    pub(crate) fn last_in_order(&self) -> Option<&E> {
+        // `ordered` is empty in a calendar.
+        self.ordered.back()
+    }
+
+    /// Adds an event at the instant `at`. `make` constructs the event in its final place, so no large value is moved. `follows` tells whether the key of
+    /// the event is at least the key of [`EventQueue::last_in_order`].
+    #[inline(always)]
+    pub(crate) fn push_made(&mut self, at: Instant, follows: bool, make: impl FnOnce() -> E) {
         if self.in_order {
-            if self.ordered.back().is_none_or(follows) {
+            if follows {
                 return self.ordered.push(make);
             }
             self.become_calendar();

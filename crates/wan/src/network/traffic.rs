@@ -87,15 +87,12 @@ impl<P: Clone> Traffic<P> {
         }
         let turn = Turn::arrival(line);
         // `Pending::key` orders the events. Instants and turns differ for nearly all pairs, so the whole key is compared only when both are
-        // equal.
-        let follows = |last: &Pending<P>| {
-            if last.at != at {
-                last.at < at
-            } else if last.turn != turn {
-                last.turn < turn
-            } else {
-                last.key() <= (at, turn, sequence, path, size.copy())
-            }
+        // equal. A closure here would be compiled as a function of its own, with all that it compares written to the stack first.
+        let follows = match self.pending.last_in_order() {
+            None => true,
+            Some(last) if last.at != at => last.at < at,
+            Some(last) if last.turn != turn => last.turn < turn,
+            Some(last) => last.key() <= (at, turn, sequence, path, size.copy()),
         };
         self.pending.push_made(at, follows, || Pending { at, sequence, offered, entered, turn, path, size, payload: Some(payload) });
     }
