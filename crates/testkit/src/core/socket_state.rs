@@ -60,8 +60,6 @@ pub(crate) struct SocketState {
     /// Size of the receive buffer \[byte\].
     pub(super) room: usize,
     pub(super) inbox: VecDeque<Box<Parcel>>,
-    /// Bytes of all datagrams in `inbox`, without overhead.
-    pub(super) held: usize,
     /// Memory that Linux would count for all datagrams in `inbox` \[bytes\].
     pub(super) memory: usize,
     pub(super) readers: Waiters,
@@ -92,22 +90,22 @@ impl SocketState {
             return Err(Lost::BufferFull);
         }
         self.memory = memory;
-        self.held += len;
         self.inbox.push_back(parcel);
         self.readers.wake(woken);
         Ok(())
     }
 
-    /// Returns the bytes of the datagrams in the buffer, as [`Held`] counts them.
+    /// Returns the bytes of the datagrams in the buffer, as [`Held`] counts them. Counted here, because only the end of a socket and the message of a failure
+    /// need the number.
     pub(super) fn cost(&self) -> u64 {
-        self.held as u64 + self.inbox.len() as u64 * Held::cost(0)
+        self.inbox.iter().map(|datagram| Held::cost(datagram.bytes.len())).sum()
     }
 
     /// Drops all datagrams in the buffer.
     pub(super) fn clear(&mut self, all: &mut Held) {
         all.remove(self.cost());
         self.inbox.clear();
-        (self.held, self.memory) = (0, 0);
+        self.memory = 0;
     }
 
     pub(super) fn name(&self) -> SocketName {

@@ -88,7 +88,6 @@ impl Core {
             peer: None,
             room,
             inbox,
-            held: 0,
             memory: 0,
             readers,
             refused: false,
@@ -264,7 +263,6 @@ impl Core {
             return Poll::Pending;
         };
         let len = datagram.bytes.len();
-        socket.held -= len;
         socket.memory -= datagram.memory;
         self.wire.held.remove(Held::cost(len));
         // `look` returns no reference into the datagram, so the memory of the datagram is used again at once.

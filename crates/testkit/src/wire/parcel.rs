@@ -304,14 +304,23 @@ impl<A: Default> Spare<A> {
     }
 
     /// Takes back a read parcel. Drops the parcel if enough are kept, and the content if shared or too long.
-    #[inline]
-    pub(crate) fn put(&mut self, mut parcel: Box<Parcel<A>>) {
+    #[inline(always)]
+    pub(crate) fn put(&mut self, parcel: Box<Parcel<A>>) {
         // A burst must not occupy memory for the rest of the run.
+        if matches!(&parcel.bytes.content, Content::Own(octets) if octets.capacity() <= Self::LONGEST) && self.parcels.len() < Self::MOST {
+            self.parcels.push(parcel);
+        } else {
+            self.put_other(parcel);
+        }
+    }
+
+    /// Like [`Spare::put`], for a parcel that is dropped, in whole or in part.
+    #[inline(never)]
+    fn put_other(&mut self, mut parcel: Box<Parcel<A>>) {
         if self.parcels.len() >= Self::MOST {
             return;
         }
         match &mut parcel.bytes.content {
-            Content::Own(octets) if octets.capacity() <= Self::LONGEST => {}
             // The memory of the writer is not kept, only the box.
             #[cfg(feature = "tcp")]
             Content::Segment(whole) => (whole.segment.payload, whole.packet) = (Payload::default(), OnceLock::new()),
