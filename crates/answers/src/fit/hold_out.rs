@@ -4,13 +4,12 @@ use std::convert::Infallible;
 use std::time::Duration;
 
 use cohaptic_measure::fit::hold_out::{Figures, HoldOut, LAGS};
+use cohaptic_measure::fit::transfer::Transfers;
 use cohaptic_measure::fit::{Fitted, Measurement, Measurements};
 use cohaptic_measure::steady::SteadyStream;
 use cohaptic_units::{Bytes, Ecn};
 use cohaptic_wan::{Fate, Link, LinkConfig, LinkName, PacketInfo};
 use serde::Serialize;
-
-use super::transfer::Transfers;
 
 /// Packets that are sent over the link to find its figures: so many that chance hardly counts beside that of the measurement.
 const PACKETS: u64 = 400_000;

@@ -9,7 +9,6 @@ mod probed;
 mod recorded;
 mod scene_link;
 mod source;
-mod transfer;
 mod words;
 
 use std::path::{Path, PathBuf};

@@ -37,6 +37,7 @@ mod skew;
 mod steps;
 mod table;
 mod ticks;
+pub mod transfer;
 
 use std::fmt::Write as _;
 use std::sync::Arc;

@@ -2,18 +2,21 @@
 //!
 //! A client connects, and a server sends 10⁶ bytes as soon as it accepts; both ways of the connection have the same link. The time is that from the first
 //! packet to the last byte. TCP is that of [`cohaptic_tcp`], which the test kit has too. Each figure is the median of 101 connections.
+//!
+//! The loop over segments compiles the generic link, so it is in this crate, which is optimised in all builds.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::Duration;
 
-use cohaptic_measure::fit::hold_out::Figures;
-use cohaptic_measure::fit::{Measurement, Measurements};
 use cohaptic_tcp::{Connection, Segment, TcpConfig};
 use cohaptic_units::{Bytes, Instant, Probability};
 use cohaptic_wan::law::Empirical;
 use cohaptic_wan::{Between, Delay, Distribution, Fate, GilbertElliott, Jitter, Link, LinkConfig, LinkName, Loss, PathTrace};
 use serde::Serialize;
+
+use super::hold_out::Figures;
+use super::{Measurement, Measurements};
 
 /// Bytes that the server sends.
 const BYTES: usize = 1_000_000;
@@ -22,18 +25,23 @@ const CONNECTIONS: u32 = 101;
 
 /// Median time of a transfer \[s\]; `None` if half of the connections end without all bytes, or if no link can be made.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub(super) struct Transfers {
+pub struct Transfers {
     /// Over the held-out packets: a packet has the fate of the latest held-out packet that was sent before.
-    pub(super) measured: Option<f64>,
-    pub(super) best: Option<f64>,
-    pub(super) independent: Option<f64>,
-    pub(super) gilbert: Option<f64>,
-    pub(super) replay: Option<f64>,
+    pub measured: Option<f64>,
+    /// Over the fitted link.
+    pub best: Option<f64>,
+    /// Over independent losses and delays with the figures of the first part.
+    pub independent: Option<f64>,
+    /// Over losses in runs and independent delays with the figures of the first part.
+    pub gilbert: Option<f64>,
+    /// Over the packets of the first part, as over the held-out packets.
+    pub replay: Option<f64>,
 }
 
 impl Transfers {
     /// Measures transfers over the fitted link `config`, over the parts `first` and `rest`, and over links with the figures of the first part.
-    pub(super) fn of(config: &LinkConfig, first: &Measurements, rest: &Measurements, figures: &Figures) -> Self {
+    #[must_use]
+    pub fn of(config: &LinkConfig, first: &Measurements, rest: &Measurements, figures: &Figures) -> Self {
         // Packets overtake each other in all columns or in none: the fitted link says which.
         let like_fitted = || LinkConfig { order: config.order, ..LinkConfig::default() };
         let drawn = |loss: Loss| {
