@@ -14,8 +14,8 @@
 //! only once, while a heap would sift every event. Neither the bucket of an event nor the form of the queue changes the order of events: the order depends on
 //! the keys alone.
 //!
-//! In the calendar an event stays in the slab where it was first stored. Buckets sort one word per event: the time since the beginning of the bucket, and the
-//! index in the slab. The events, of some 48 bytes, are moved only into and out of the slab.
+//! In the calendar an event stays in its [store](Store). Buckets sort one word per event: the time since the beginning of the bucket, and the place in the
+//! store. The store of an [`EventQueue`] is a slab of events. A network has a store that keeps what the packets of a broadcast have in common only once.
 //!
 //! The width of the buckets adapts to the events, so a bucket holds 4 to 16 events on average. With fewer events per bucket, searches for the next bucket
 //! cost more; with more events, sorting costs more.
@@ -24,7 +24,9 @@
 //! any, and finding and emptying the bucket takes longer than the insertion.
 
 mod front;
-mod slab;
+pub(crate) mod slab;
+#[cfg(test)]
+mod tests;
 
 use alloc::collections::BinaryHeap;
 use alloc::vec::Vec;
@@ -51,13 +53,76 @@ pub trait Event {
 
 /// Queue of events, taken in the order of their keys.
 #[derive(Clone, Debug)]
-pub struct EventQueue<E> {
+pub struct EventQueue<E>(Queue<E, Slab<E>>);
+
+impl<E: Event> Default for EventQueue<E> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<E: Event> EventQueue<E> {
+    /// Returns an empty queue.
+    #[must_use]
+    pub fn new() -> Self {
+        Self(Queue::new(Slab::new()))
+    }
+
+    /// Returns the number of pending events.
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Returns whether no event is pending.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.0.len() == 0
+    }
+
+    /// Adds an event. An event may lie before events already taken, and is then taken before all later events.
+    #[inline(always)]
+    pub fn push(&mut self, event: E) {
+        self.0.push(event);
+    }
+
+    /// Removes and returns the first event if its instant is at most `now`.
+    #[inline(always)]
+    pub fn pop_due(&mut self, now: Instant) -> Option<E> {
+        self.0.take_due(now, |event| event)
+    }
+
+    /// Returns the instant of the first event, or `None` for an empty queue.
+    #[must_use]
+    pub fn next_at(&self) -> Option<Instant> {
+        self.0.next_at()
+    }
+}
+
+/// Storage of the events of a calendar.
+pub(crate) trait Store<E: Event> {
+    /// Stores an event constructed by `make`, and returns its place.
+    fn store(&mut self, make: impl FnOnce() -> E) -> Place;
+
+    /// Removes and returns the event at a place. `at` is the instant of the event.
+    fn take(&mut self, at: Instant, place: Place) -> Option<E>;
+
+    /// Returns the key of the event at a place, or `None` for a place without event. `at` is the instant of the event.
+    fn key(&self, at: Instant, place: Place) -> Option<E::Key>;
+}
+
+/// Place of an event in a store: a number below 2^[`PLACE_BITS`].
+pub(crate) type Place = u64;
+
+/// [`EventQueue`] with the store S.
+#[derive(Clone, Debug)]
+pub(crate) struct Queue<E, S> {
     /// All events while `in_order` is true, else empty.
     ordered: Ring<E>,
-    /// Whether the queue is a ring (all events in `ordered`) or a calendar (all events in `slab`).
+    /// Whether the queue is a ring (all events in `ordered`) or a calendar (all events in `store`).
     in_order: bool,
-    /// Events of the calendar. Each event keeps its index until its removal.
-    slab: Slab<E>,
+    /// Events of the calendar. Each event keeps its place until its removal.
+    store: S,
     /// Events in order, with the next events to take: the events of the current bucket, and events pushed later into this bucket or an earlier bucket.
     front: Front,
     /// `true` if all events of the calendar lie in `front`, whatever their buckets. Becomes `false` when the calendar has more than [`SHORT`] events, and stays
@@ -84,15 +149,18 @@ pub struct EventQueue<E> {
     brought: (u32, u64),
 }
 
-/// Event outside `ring`: its instant, and its index in the slab.
-type Entry = (Instant, u32);
+/// Event outside `ring`: its instant, and its place in the store.
+type Entry = (Instant, Place);
 
-/// Event in a bucket. The upper 32 bits are the time since the beginning of the bucket \[ns\], the lower 32 bits the index in the slab.
+/// Event in a bucket. The lower [`PLACE_BITS`] bits are the place in the store, the upper bits the time since the beginning of the bucket \[ns\].
 type Packed = u64;
+
+/// Number of bits of a place.
+const PLACE_BITS: u32 = 42;
 
 /// Number of slots, a power of two. With the widths below, the slots span 134 ms to 34 s.
 const RING: usize = 8192;
-/// Allowed exponents of the width. At most 32, so a time within a bucket fits into half a word.
+/// Allowed exponents of the width. At most 64 − [`PLACE_BITS`], so a time within a bucket and a place fit into a word.
 const WIDTHS: core::ops::RangeInclusive<u32> = 14..=22;
 /// Initial exponent of the width: buckets of 131 µs.
 const FIRST_WIDTH: u32 = 17;
@@ -103,20 +171,13 @@ const LOOK_EVERY: u32 = 1024;
 /// Average number of events per bucket without a change of the width.
 const RIGHT_FILL: core::ops::RangeInclusive<u64> = 4..=16;
 
-impl<E: Event> Default for EventQueue<E> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl<E: Event> EventQueue<E> {
-    /// Returns an empty queue.
-    #[must_use]
-    pub fn new() -> Self {
+impl<E: Event, S: Store<E>> Queue<E, S> {
+    /// Returns an empty queue with an empty store.
+    pub(crate) fn new(store: S) -> Self {
         Self {
             ordered: Ring::new(),
             in_order: true,
-            slab: Slab::new(),
+            store,
             front: Front::default(),
             is_short: false,
             current: 0,
@@ -132,20 +193,13 @@ impl<E: Event> EventQueue<E> {
     }
 
     /// Returns the number of pending events.
-    #[must_use]
-    pub const fn len(&self) -> usize {
+    pub(crate) const fn len(&self) -> usize {
         if self.in_order { self.ordered.len() } else { self.len }
     }
 
-    /// Returns whether no event is pending.
-    #[must_use]
-    pub const fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Adds an event. An event may lie before events already taken, and is then taken before all later events.
+    /// Adds an event: see [`EventQueue::push`].
     #[inline(always)]
-    pub fn push(&mut self, event: E) {
+    pub(crate) fn push(&mut self, event: E) {
         if self.in_order {
             if self.ordered.back().is_none_or(|last| last.key() <= event.key()) {
                 self.ordered.push(|| event);
@@ -174,47 +228,43 @@ impl<E: Event> EventQueue<E> {
             }
             self.become_calendar();
         }
-        let place = self.slab.store(make);
-        self.len += 1;
-        self.push_entry((at, place));
+        let place = self.store.store(make);
+        self.push_stored(at, place);
     }
 
-    /// Removes and returns the first event if its instant is at most `now`.
-    #[inline(always)]
-    pub fn pop_due(&mut self, now: Instant) -> Option<E> {
+    /// Turns the queue into a calendar, and returns the store. Events put into the store must be announced by [`Queue::push_stored`] before the next removal.
+    pub(crate) fn open_store(&mut self) -> &mut S {
         if self.in_order {
-            if self.ordered.front()?.at() > now {
-                return None;
-            }
-            return self.ordered.pop();
+            self.become_calendar();
         }
-        if !self.is_due(now) {
-            return None;
-        }
-        let (_, place) = self.front.pop()?;
-        self.len -= 1;
-        // An empty calendar becomes a ring again.
-        self.in_order = self.len == 0;
-        self.slab.take(place)
+        &mut self.store
+    }
+
+    /// Adds an event of the store. The queue is a calendar.
+    #[inline(always)]
+    pub(crate) fn push_stored(&mut self, at: Instant, place: Place) {
+        self.len += 1;
+        self.push_entry((at, place));
     }
 
     /// Removes the first event if its instant is at most `now`, and returns the answer of `take` for the event. `take` is called at one place for both forms of
     /// the queue, so the compiler inlines `take` and reads only the used fields of the event.
     #[inline(always)]
     pub(crate) fn take_due<T>(&mut self, now: Instant, take: impl FnOnce(E) -> T) -> Option<T> {
-        let place = if self.in_order {
+        let event = if self.in_order {
             self.ordered.front().filter(|first| first.at() <= now)?;
-            self.ordered.pass_front()?
+            self.ordered.pop()?
         } else {
             if !self.is_due(now) {
                 return None;
             }
-            let (_, place) = self.front.pop()?;
+            let (at, place) = self.front.pop()?;
             self.len -= 1;
+            // An empty calendar becomes a ring again.
             self.in_order = self.len == 0;
-            self.slab.pass(place)
+            self.store.take(at, place)?
         };
-        place.take().map(take)
+        Some(take(event))
     }
 
     /// Returns the key of the first event if its instant is at most `now`.
@@ -226,7 +276,7 @@ impl<E: Event> EventQueue<E> {
         if !self.is_due(now) {
             return None;
         }
-        self.front.first().and_then(|first| self.slab.key(first.1))
+        self.front.first().and_then(|first| self.store.key(first.0, first.1))
     }
 
     /// Returns whether the front of the calendar begins with an event that is due at `now`, after a search for the next bucket if the front is empty.
@@ -249,8 +299,7 @@ impl<E: Event> EventQueue<E> {
     }
 
     /// Returns the instant of the first event, or `None` for an empty queue.
-    #[must_use]
-    pub fn next_at(&self) -> Option<Instant> {
+    pub(crate) fn next_at(&self) -> Option<Instant> {
         if self.in_order {
             return self.ordered.front().map(Event::at);
         }
@@ -280,9 +329,8 @@ impl<E: Event> EventQueue<E> {
     #[inline]
     fn push_calendar(&mut self, event: E) {
         let at = event.at();
-        let place = self.slab.store(|| event);
-        self.len += 1;
-        self.push_entry((at, place));
+        let place = self.store.store(|| event);
+        self.push_stored(at, place);
     }
 
     /// Distributes the events of a short calendar, which are all in the front, to buckets.
@@ -298,7 +346,7 @@ impl<E: Event> EventQueue<E> {
         }
     }
 
-    /// Puts an event of the slab into the front, into a bucket, or beyond the buckets.
+    /// Puts an event of the store into the front, into a bucket, or beyond the buckets.
     #[inline(always)]
     fn push_entry(&mut self, entry: Entry) {
         // Later buckets stay unsorted until their time comes. A bucket before the next bucket is far beyond the ring in this difference.
@@ -335,12 +383,12 @@ impl<E: Event> EventQueue<E> {
 
     /// Packs an entry into the word of its bucket.
     fn pack(&self, (at, place): Entry) -> Packed {
-        (at.as_nanos() & ((1 << self.width) - 1)) << 32 | u64::from(place)
+        (at.as_nanos() & ((1 << self.width) - 1)) << PLACE_BITS | place
     }
 
     /// Returns the entry of a word in the bucket with the number `bucket`.
     fn unpack(&self, bucket: u64, packed: Packed) -> Entry {
-        (Instant::from_nanos((bucket << self.width) + (packed >> 32)), place_of(packed))
+        unpack(self.width, bucket, packed)
     }
 
     /// Brings the next bucket to the front if the front is empty and the bucket has begun at `now`. Returns whether the front begins with a due event.
@@ -372,21 +420,25 @@ impl<E: Event> EventQueue<E> {
         let mut events = core::mem::take(&mut self.ring[place]);
         self.brought = (self.brought.0 + 1, self.brought.1 + events.len() as u64);
         let mut few = [0; FEW];
-        let is_tie = |pair: &[Packed]| pair[0] >> 32 == pair[1] >> 32;
+        let is_tie = |pair: &[Packed]| pair[0] >> PLACE_BITS == pair[1] >> PLACE_BITS;
+        let key = |packed: &Packed| {
+            let (at, place) = self.unpack(bucket, *packed);
+            self.store.key(at, place)
+        };
         let sorted = if events.windows(2).any(is_tie) {
             // Events of one instant, such as a flight of segments, are pushed in few ascending runs of keys. A stable sort merges the runs.
-            events.sort_by_key(|packed| self.slab.key(place_of(*packed)));
+            events.sort_by_key(key);
             &mut events
         } else {
             let sorted = sort(&mut events, &mut few);
             if sorted.windows(2).any(is_tie) {
-                // Words sort by instant and then by index in the slab. Keys are read from the slab only for two equal instants.
-                sorted.sort_unstable_by_key(|packed| self.slab.key(place_of(*packed)));
+                // Words sort by instant and then by place. Keys are read from the store only for two equal instants.
+                sorted.sort_unstable_by_key(key);
             }
             sorted
         };
-        let start = bucket << self.width;
-        self.front.extend(sorted.iter().map(|&packed| (Instant::from_nanos(start + (packed >> 32)), place_of(packed))));
+        let width = self.width;
+        self.front.extend(sorted.iter().map(|packed| unpack(width, bucket, *packed)));
         // Buckets without any event so far have no memory to keep.
         events.clear();
         if events.capacity() > 0 {
@@ -444,9 +496,9 @@ impl<E: Event> EventQueue<E> {
 
     /// Inserts an entry into the front by instant and key.
     fn push_front(&mut self, entry: Entry) {
-        let Self { front, slab, .. } = self;
-        // Instants differ for nearly all pairs, so keys are read from the slab only for two equal instants.
-        front.insert(entry, |other| other.0 < entry.0 || other.0 == entry.0 && slab.are_in_order(other.1, entry.1));
+        let Self { front, store, .. } = self;
+        // Instants differ for nearly all pairs, so keys are read from the store only for two equal instants.
+        front.insert(entry, |other| other.0 < entry.0 || other.0 == entry.0 && are_in_order(store, *other, entry));
     }
 
     #[inline(always)]
@@ -494,10 +546,16 @@ fn slot(bucket: u64) -> usize {
     (bucket & (RING as u64 - 1)) as usize
 }
 
-/// Returns the index in the slab of a packed event.
-#[expect(clippy::cast_possible_truncation, reason = "the lower half is the place")]
-fn place_of(packed: Packed) -> u32 {
-    packed as u32
+/// Returns the entry of a word in the bucket with the number `bucket`, if buckets span 2^`width` ns.
+fn unpack(width: u32, bucket: u64, packed: Packed) -> Entry {
+    (Instant::from_nanos((bucket << width) + (packed >> PLACE_BITS)), packed & ((1 << PLACE_BITS) - 1))
+}
+
+/// Returns whether the key of the event `first` is at most the key of the event `second`. Not inlined, because the comparison of two keys is longer than
+/// everything around it, and rare.
+#[inline(never)]
+fn are_in_order<E: Event>(store: &impl Store<E>, first: Entry, second: Entry) -> bool {
+    store.key(first.0, first.1) <= store.key(second.0, second.1)
 }
 
 /// Sorts distinct words. At most [`FEW`] words are sorted into `few` by counting: the number of smaller words is the index of a word. No branch then depends on
@@ -508,7 +566,7 @@ fn sort<'a>(words: &'a mut [Packed], few: &'a mut [Packed; FEW]) -> &'a mut [Pac
         return words;
     }
     for word in &*words {
-        // Words are distinct, because each has a different index in the slab, so no two ranks are equal.
+        // Words are distinct, because each has a different place in the store, so no two ranks are equal.
         let rank: usize = words.iter().map(|other| usize::from(other < word)).sum();
         few[rank] = *word;
     }
@@ -517,76 +575,3 @@ fn sort<'a>(words: &'a mut [Packed], few: &'a mut [Packed; FEW]) -> &'a mut [Pac
 
 /// Largest number of words sorted by counting.
 const FEW: usize = 24;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-    struct Note(u64, u32);
-
-    impl Event for Note {
-        type Key = Self;
-
-        fn at(&self) -> Instant {
-            Instant::from_nanos(self.0)
-        }
-
-        fn key(&self) -> Self {
-            *self
-        }
-    }
-
-    #[test]
-    fn simultaneous_events_come_in_order_of_their_keys() {
-        let mut queue = EventQueue::new();
-        for key in [3, 1, 2, 0] {
-            queue.push(Note(1_000_000, key));
-        }
-        assert_eq!(queue.next_at(), Some(Instant::from_nanos(1_000_000)));
-        assert_eq!(queue.pop_due(Instant::from_nanos(999_999)), None);
-        let order: Vec<u32> = core::iter::from_fn(|| queue.pop_due(Instant::from_nanos(1_000_000))).map(|note| note.1).collect();
-        assert_eq!(order, [0, 1, 2, 3]);
-    }
-
-    /// For events in the ring, in buckets and beyond the buckets: `may_be_due` is true if an event is due, and false after a search at the same instant that
-    /// found no event.
-    #[test]
-    fn what_is_due_may_be_due() {
-        let (mut queue, mut pending, mut number) = (EventQueue::new(), alloc::collections::BTreeSet::new(), 2015_u64);
-        let mut draw = |below: u64| {
-            number = number.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (number >> 33) % below
-        };
-        let (mut now, mut quiet) = (0, 0);
-        for key in 0..20_000 {
-            let reach = [1, 200_000, 30_000_000, 3_000_000_000][usize::try_from(draw(4)).expect("small")];
-            if draw(3) > 0 {
-                let note = Note(now + draw(reach), key);
-                queue.push(note);
-                pending.insert(note);
-            }
-            now += draw(2) * draw(2_000_000);
-            let (at, first) = (Instant::from_nanos(now), pending.first().copied().filter(|first: &Note| first.0 <= now));
-            assert!(first.is_none() || queue.may_be_due(at), "{first:?} is due at {now}");
-            quiet += usize::from(first.is_none() && !pending.is_empty() && !queue.may_be_due(at));
-            assert_eq!(queue.pop_due(at), first);
-            if let Some(first) = first {
-                pending.remove(&first);
-            } else {
-                assert!(!queue.may_be_due(at), "what was searched in vain at {now} is searched again");
-            }
-        }
-        assert!(quiet > 1000, "only {quiet} instants were known to be quiet");
-    }
-
-    #[test]
-    fn the_edges_of_time_are_ordinary_instants() {
-        let mut queue = EventQueue::new();
-        for at in [u64::MAX, 0, u64::MAX - 1] {
-            queue.push(Note(at, 0));
-        }
-        let order: Vec<u64> = core::iter::from_fn(|| queue.pop_due(Instant::MAX)).map(|note| note.0).collect();
-        assert_eq!(order, [0, u64::MAX - 1, u64::MAX]);
-    }
-}

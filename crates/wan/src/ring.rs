@@ -115,18 +115,6 @@ impl<T> Ring<T> {
         }
     }
 
-    /// Removes the first value from the ring, and returns its slot. The caller must take the value out of the slot, because `push` needs a free slot.
-    #[inline(always)]
-    pub(crate) fn pass_front(&mut self) -> Option<&mut Option<T>> {
-        // `pass` moves `first`, so the index of the slot is kept.
-        let first = self.first;
-        if self.len == 0 {
-            return None;
-        }
-        self.pass();
-        self.places.get_mut(first)
-    }
-
     /// Drops all values and keeps the memory.
     pub fn clear(&mut self) {
         while self.len > 0 {

@@ -1,68 +1,87 @@
-//! Storage of the events of a calendar.
+//! Storage with stable indices.
 
 use alloc::vec::Vec;
 
-use super::Event;
+use cohaptic_units::Instant;
 
-/// Storage of events with stable indices. Indices of removed events are reused.
+use super::{Event, Place, Store};
+
+/// Storage of values with stable indices. Indices of removed values are reused.
 #[derive(Clone, Debug)]
-pub(super) struct Slab<E> {
-    /// Events by index. `None` for a free index.
-    places: Vec<Option<E>>,
+pub(crate) struct Slab<T> {
+    /// Values by index. `None` for a free index.
+    places: Vec<Option<T>>,
     /// Free indices.
     free: Vec<u32>,
 }
 
-impl<E: Event> Slab<E> {
-    pub(super) const fn new() -> Self {
+/// Greatest number of values. The 42 bits of a [`Place`] then have room for an index and the number of a node.
+const MOST: u32 = 1 << 26;
+
+impl<T> Slab<T> {
+    pub(crate) const fn new() -> Self {
         Self { places: Vec::new(), free: Vec::new() }
     }
 
-    /// Stores an event constructed by `make`, and returns its index.
+    /// Stores a value constructed by `make`, and returns its index.
     #[inline(always)]
-    pub(super) fn store(&mut self, make: impl FnOnce() -> E) -> u32 {
-        let place = self.free.pop().unwrap_or_else(|| self.grow());
-        let stored = &mut self.places[place as usize];
-        // Always true: only free indices are handed out. With the test the compiler knows of no old event to drop, so the event can be constructed in its
+    pub(crate) fn insert(&mut self, make: impl FnOnce() -> T) -> u32 {
+        let index = self.free.pop().unwrap_or_else(|| self.grow());
+        let stored = &mut self.places[index as usize];
+        // Always true: only free indices are handed out. With the test the compiler knows of no old value to drop, so the value can be constructed in its
         // place.
         if stored.is_none() {
             *stored = Some(make());
         }
-        place
+        index
     }
 
-    /// Adds an index without an event, and returns the index.
+    /// Adds an index without a value, and returns the index.
     #[cold]
     #[inline(never)]
     fn grow(&mut self) -> u32 {
-        let place = u32::try_from(self.places.len()).expect("fewer than 2^32 events, 200 GB of them, are pending");
+        let index = u32::try_from(self.places.len()).ok().filter(|index| *index < MOST);
         self.places.push(None);
-        place
+        index.expect("fewer than 2^26 broadcasts and single events, 3 GB of them, are pending")
     }
 
-    /// Frees an index, and returns its place. The caller must take the event out of the place before the next call of `store`.
+    /// Removes and returns the value at an index.
     #[inline(always)]
-    pub(super) fn pass(&mut self, place: u32) -> &mut Option<E> {
-        self.free.push(place);
-        &mut self.places[place as usize]
+    pub(crate) fn remove(&mut self, index: u32) -> Option<T> {
+        self.free.push(index);
+        self.places[index as usize].take()
     }
 
-    /// Removes and returns the event at an index.
-    #[inline]
-    pub(super) fn take(&mut self, place: u32) -> Option<E> {
-        self.free.push(place);
-        self.places[place as usize].take()
+    /// Returns the value at an index, or `None` for a free index.
+    #[inline(always)]
+    pub(crate) fn get(&self, index: u32) -> Option<&T> {
+        self.places[index as usize].as_ref()
     }
 
-    /// Returns whether the key of the event at index `first` is at most the key of the event at index `second`. Not inlined, because the comparison of two keys
-    /// is longer than everything around it, and rare.
-    #[inline(never)]
-    pub(super) fn are_in_order(&self, first: u32, second: u32) -> bool {
-        self.key(first) <= self.key(second)
+    /// Returns the value at an index for a change, or `None` for a free index.
+    #[inline(always)]
+    pub(crate) fn get_mut(&mut self, index: u32) -> Option<&mut T> {
+        self.places[index as usize].as_mut()
+    }
+}
+
+impl<E: Event> Store<E> for Slab<E> {
+    #[inline(always)]
+    fn store(&mut self, make: impl FnOnce() -> E) -> Place {
+        self.insert(make).into()
     }
 
-    /// Returns the key of a stored event, or `None` for a free index.
-    pub(super) fn key(&self, place: u32) -> Option<E::Key> {
-        self.places[place as usize].as_ref().map(Event::key)
+    #[inline(always)]
+    fn take(&mut self, _at: Instant, place: Place) -> Option<E> {
+        self.remove(index(place))
     }
+
+    fn key(&self, _at: Instant, place: Place) -> Option<E::Key> {
+        self.get(index(place)).map(Event::key)
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "places of a slab are its indices")]
+fn index(place: Place) -> u32 {
+    place as u32
 }

@@ -20,11 +20,11 @@ const OFFERED_AT_ONCE: u16 = 8;
 type Row<P> = [Line<P, InNetwork<P>>];
 
 /// Values that all packets of a broadcast share.
-struct Sent<'a, P> {
-    now: Instant,
-    from: NodeId,
-    size: SizeAndMarks,
-    payload: &'a P,
+pub(super) struct Sent<'a, P> {
+    pub(super) now: Instant,
+    pub(super) from: NodeId,
+    pub(super) size: SizeAndMarks,
+    pub(super) payload: &'a P,
 }
 
 /// A packet of a broadcast that does more than arrive later: its receiver, its number, and what its link has decided.
@@ -139,18 +139,29 @@ fn schedule_groups<P: Clone>(row: &mut Row<P>, first: LinkId, traffic: &mut Traf
 /// Like [`schedule_groups`], for links of which some draw random numbers, so that each packet arrives at an instant of its own.
 #[inline(never)]
 fn schedule_each<P: Clone>(row: &mut Row<P>, first: LinkId, traffic: &mut Traffic<P>, sent: &Sent<'_, P>, mut begin: u16) -> Option<Unusual> {
+    let receiver = if begin == sent.from.0 { begin + 1 } else { begin };
+    let mut open = traffic.open(sent, first, row.get(usize::from(receiver))?.offered());
+    let mut unusual = None;
     for lines in row[usize::from(begin)..].chunks_mut(usize::from(OFFERED_AT_ONCE)) {
-        let (arrivals, unusual) = offer_to_some(lines, sent, begin);
+        let (arrivals, other) = offer_to_some(lines, sent, begin);
         for ((line, at), to) in lines.iter().zip(&arrivals).zip((begin..).map(NodeId)).filter(|((_, at), _)| **at > sent.now) {
             // The latest packet of the link was offered just now.
-            traffic.schedule(*at, link_to(first, to), sent.packet(to, line.offered() - 1));
+            let sequence = line.offered() - 1;
+            // Numbers differ only if single packets are sent between broadcasts.
+            if sequence != open.sequence {
+                traffic.close(&open);
+                open = traffic.open(sent, first, sequence);
+            }
+            traffic.schedule_shared(*at, to, &mut open);
         }
-        if unusual.is_some() {
-            return unusual;
+        if other.is_some() {
+            unusual = other;
+            break;
         }
         begin += OFFERED_AT_ONCE;
     }
-    None
+    traffic.close(&open);
+    unusual
 }
 
 /// Offers a packet to each of at most [`OFFERED_AT_ONCE`] links to the receivers from `begin` on, up to the first packet that does not arrive later. Returns the

@@ -25,6 +25,7 @@ mod passage;
 mod paths;
 mod pending;
 mod relay;
+mod sendings;
 pub(crate) mod stepped_links;
 mod traffic;
 
@@ -410,7 +411,7 @@ impl<P: Clone> Network<P> {
                 return Some(event);
             }
         }
-        if let Some(event) = self.traffic.dropped.pop_front() {
+        if let Some(event) = self.traffic.pop_dropped() {
             return Some(event);
         }
         // Everything due has happened, so the awaited instants up to now are over.

@@ -8,7 +8,7 @@ use cohaptic_units::Instant;
 use super::Network;
 use super::id::Path;
 use super::pending::{InNetwork, LineId, Pending, SizeAndMarks};
-use super::traffic::{Exits, Traffic};
+use super::traffic::Exits;
 use crate::fates::fate::{DropCause, Fate};
 use crate::fates::record::PacketEvent;
 use crate::line::Line;
@@ -42,7 +42,7 @@ impl<P: Clone> Network<P> {
     fn settle_all(&mut self, now: Instant) {
         self.let_happen(now);
         // Arrivals later than a dropped packet come after the packet.
-        while let Some(dropped) = self.traffic.dropped.pop_front() {
+        while let Some(dropped) = self.traffic.pop_dropped() {
             self.traffic.happened.push_back(dropped);
             self.let_happen(now);
         }
@@ -193,8 +193,10 @@ impl<P: Clone> Network<P> {
         self.lines.get_mut(line).drop(cause);
         let event = self.traffic.event(line, packet, now, Fate::Dropped(cause));
         // With inner events, everything due by `now` has happened at the offer. Without, arrivals that are due wait for the poll.
-        let Traffic { happened, dropped, .. } = &mut self.traffic;
-        let events = if self.has_inner_events { happened } else { dropped };
-        events.push_back(event);
+        if self.has_inner_events {
+            self.traffic.happened.push_back(event);
+        } else {
+            self.traffic.push_dropped(event);
+        }
     }
 }

@@ -157,6 +157,12 @@ impl Turn {
         Self(Self::waking(line).0 + (3 << NUMBER_BITS))
     }
 
+    /// Returns the turn of the packet of a broadcast to the node `to`, if `self` is the turn of the packet to node 0: links to receivers have successive numbers.
+    #[inline(always)]
+    pub(super) const fn to_receiver(self, to: NodeId) -> Self {
+        Self(self.0 + to.0 as u32)
+    }
+
     /// Returns the link of the event. The event must belong to a link, not to an access line.
     pub(super) const fn link(self) -> LinkId {
         LinkId(self.0 & ((1 << NUMBER_BITS) - 1))

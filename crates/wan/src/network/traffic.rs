@@ -6,10 +6,12 @@ use alloc::collections::{BTreeMap, VecDeque};
 use cohaptic_units::Instant;
 
 use super::awaited::Awaited;
+use super::broadcast::Sent;
 use super::groups::{Group, Groups};
-use super::id::{NodeId, Path};
+use super::id::{LinkId, NodeId, Path};
 use super::pending::{InNetwork, LineId, Pending, SizeAndMarks, Turn};
-use crate::event_queue::{Event, EventQueue};
+use super::sendings::{Open, Sendings};
+use crate::event_queue::{Event, Queue};
 use crate::fates::damage::Damage;
 use crate::fates::fate::Fate;
 use crate::fates::record::PacketEvent;
@@ -19,12 +21,14 @@ use crate::packet::Marks;
 #[derive(Clone, Debug)]
 pub(super) struct Traffic<P> {
     /// Events to come, apart from the packets in `groups`.
-    pending: EventQueue<Pending<P>>,
+    pending: Queue<Pending<P>, Sendings<P>>,
     groups: Groups<P>,
     pub(super) happened: VecDeque<PacketEvent<P, Path>>,
     /// Packets dropped at their offer in a network without inner events, in the order of their instants. A packet comes after all arrivals due at its instant,
     /// and these need not happen before the poll.
-    pub(super) dropped: VecDeque<PacketEvent<P, Path>>,
+    dropped: VecDeque<PacketEvent<P, Path>>,
+    /// Instant of the first packet in `dropped`, or [`Instant::MAX`] if there is none.
+    first_dropped: Instant,
     /// Damage of packets on their way, indexed by path, sequence and copy bits. A packet has an entry exactly if its flag `DAMAGED` is set, so undamaged
     /// packets are never looked up.
     damages: BTreeMap<(Path, u64, u8), Damage>,
@@ -35,10 +39,11 @@ pub(super) struct Traffic<P> {
 impl<P: Clone> Traffic<P> {
     pub(super) fn new() -> Self {
         Self {
-            pending: EventQueue::new(),
+            pending: Queue::new(Sendings::new()),
             groups: Groups::new(),
             happened: VecDeque::new(),
             dropped: VecDeque::new(),
+            first_dropped: Instant::MAX,
             damages: BTreeMap::new(),
             awaited: None,
         }
@@ -58,12 +63,25 @@ impl<P: Clone> Traffic<P> {
     /// Removes and returns the first event if its instant is at most `now`, and at most the instant of the first packet in `dropped`.
     #[inline(always)]
     pub(super) fn pop_due(&mut self, now: Instant) -> Option<Pending<P>> {
-        let now = self.dropped.front().map_or(now, |dropped| dropped.at);
+        let now = now.min(self.first_dropped);
         match self.groups.due_key(now) {
             // In most networks with groups the queue is empty.
-            Some(key) if self.pending.is_empty() || self.pending.due_key(now).is_none_or(|other| key < other) => self.groups.take(),
+            Some(key) if self.pending.len() == 0 || self.pending.due_key(now).is_none_or(|other| key < other) => self.groups.take(),
             Some(_) | None => self.pending.take_due(now, |pending| pending),
         }
+    }
+
+    /// Appends a packet that was dropped at its offer.
+    pub(super) fn push_dropped(&mut self, event: PacketEvent<P, Path>) {
+        self.first_dropped = self.first_dropped.min(event.at);
+        self.dropped.push_back(event);
+    }
+
+    /// Removes and returns the first packet that was dropped at its offer.
+    pub(super) fn pop_dropped(&mut self) -> Option<PacketEvent<P, Path>> {
+        let event = self.dropped.pop_front()?;
+        self.first_dropped = self.dropped.front().map_or(Instant::MAX, |next| next.at);
+        Some(event)
     }
 
     /// Lets the packets of a group leave their links at the same instant.
@@ -95,6 +113,27 @@ impl<P: Clone> Traffic<P> {
             Some(last) => last.key() <= (at, turn, sequence, path, size.copy()),
         };
         self.pending.push_made(at, follows, || Pending { at, sequence, offered, entered, turn, path, size, payload: Some(payload) });
+    }
+
+    /// Makes the entry of packets that are then [added](Traffic::schedule_shared): see [`Sendings::open`].
+    #[inline(never)]
+    pub(super) fn open(&mut self, sent: &Sent<'_, P>, first: LinkId, sequence: u64) -> Open {
+        self.pending.open_store().open(sent, first, sequence)
+    }
+
+    /// Lets the packet of a broadcast to the node `to` leave its link at `at`. [`Traffic::close`] must follow before the next event is taken.
+    #[inline(always)]
+    pub(super) fn schedule_shared(&mut self, at: Instant, to: NodeId, open: &mut Open) {
+        if let Some(awaited) = &mut self.awaited {
+            awaited.schedule(at, to);
+        }
+        self.pending.push_stored(at, open.add(to));
+    }
+
+    /// Ends the additions to an entry.
+    #[inline(never)]
+    pub(super) fn close(&mut self, open: &Open) {
+        self.pending.open_store().close(open);
     }
 
     /// Schedules a wake of the engine of `line` at `at`.
