@@ -18,7 +18,9 @@ if [ ! "$program" -nt "$here/$name.cc" ]; then
     # No contraction of products and sums: the same bits as everywhere else. Debian's lists of libraries name some that its packages do not need.
     libraries=$(for module in $modules; do printf ' -l%s' "$module"; done)
     # shellcheck disable=SC2046,SC2086 # words
-    g++ -std=c++17 -O3 -DNDEBUG -ffp-contract=off "-DNS3_VERSION=\"$(pkg-config --modversion ns3-core)\"" -o "$program" "$here/$name.cc" \
+    g++ -std=c++17 -O3 -DNDEBUG -ffp-contract=off "-DNS3_VERSION=\"$(pkg-config --modversion ns3-core)\"" -o "$program.$$" "$here/$name.cc" \
         -L"$(pkg-config --variable=libdir ns3-core)" $libraries >&2
+    # Renamed as a whole: another process, such as a second test, may find the program missing or old at the same time, and must not run half of it.
+    mv "$program.$$" "$program"
 fi
 exec "$program" "$@"
