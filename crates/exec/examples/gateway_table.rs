@@ -1,11 +1,11 @@
-//! The table of docs/exec.md: what the gateway of `cohaptic exec` adds to a bare connection, in delay and in throughput.
+//! The table of docs/exec.md: what the gateway of `cohaptic exec`, and `--loopback`, add to a bare connection, in delay and in throughput.
 //!
 //! ```text
 //! cargo run --release -p cohaptic-exec --example gateway_table
 //! ```
 //!
-//! A server of the machine speaks with a client, first without any network between both, then through the gateway over links of several delays. The client is
-//! this program too.
+//! A server of the machine speaks with a client, first without any network between both, then through the gateway over links of several delays. Last, client
+//! and server are one command, whose packets to itself pass links. The client is this program too.
 #![allow(clippy::print_stdout, clippy::disallowed_methods, reason = "time is measured, and a table is printed")]
 
 use std::error::Error;
@@ -21,7 +21,7 @@ use cohaptic_linkfile::router::Network;
 use cohaptic_linkfile::{LinkTable, link_from_keys};
 use cohaptic_realtime::{Pacing, Tolerance, Wishes};
 
-/// Argument of the client, before the address of the server.
+/// Argument of the client, before the address of the server. Without an address the client starts the server itself.
 const CLIENT: &str = "client";
 /// Questions of one byte, each asked after the answer to the last.
 const QUESTIONS: usize = 1000;
@@ -35,19 +35,24 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         return Ok(ended);
     }
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    if let [role, server] = arguments.as_slice()
+    if let [role, server @ ..] = arguments.as_slice()
         && role == CLIENT
     {
-        println!("{}", client(server.parse()?)?);
+        let server = server.first().map_or_else(serve, |server| Ok(server.parse()?))?;
+        println!("{}", client(server)?);
         return Ok(ExitCode::SUCCESS);
     }
     let server = serve()?;
     println!("| connection | round trip, p50 [µs] | round trip, p99 [µs] | down [Gbit/s] | up [Gbit/s] |\n| --- | ---: | ---: | ---: | ---: |");
     let bare = Command::new(std::env::current_exe()?).args([CLIENT, &server.to_string()]).output()?;
     println!("| bare, over the loopback interface | {} |", String::from_utf8(bare.stdout)?.trim());
-    for (name, delay) in
-        [("through the gateway, no delay", "0ms"), ("through the gateway, 1 ms each way", "1ms"), ("through the gateway, 24 ms each way", "24ms")]
-    {
+    for (name, server, delay) in [
+        ("through the gateway, no delay", Some(server), "0ms"),
+        ("through the gateway, 1 ms each way", Some(server), "1ms"),
+        ("through the gateway, 24 ms each way", Some(server), "24ms"),
+        ("with `--loopback`, no delay", None, "0ms"),
+        ("with `--loopback`, 1 ms each way", None, "1ms"),
+    ] {
         println!("| {name} | {} |", through(server, delay)?);
     }
     Ok(ExitCode::SUCCESS)
@@ -119,19 +124,21 @@ fn transfer(server: SocketAddr, kind: u8, mut pass: impl FnMut(&mut TcpStream) -
     Ok(bits / 1e9 / counted_from.map_or(f64::INFINITY, |from| from.elapsed().as_secs_f64()))
 }
 
-/// Returns the cells of a row for a client beyond a link with a delay.
-fn through(server: SocketAddr, delay: &str) -> Result<String, Box<dyn Error>> {
+/// Returns the cells of a row for a client beyond links with a delay. Without a server of the machine, the client has a server of its own.
+fn through(server: Option<SocketAddr>, delay: &str) -> Result<String, Box<dyn Error>> {
     let setup = Setup {
         addresses: host(0).into_iter().zip(PREFIX).filter_map(|(address, prefix)| Network::new(address, prefix)).collect(),
+        loopback: server.is_none(),
         ..Setup::default()
     };
-    let address = SocketAddr::new(GATEWAY[0], server.port()).to_string();
-    let command = vec![std::env::current_exe()?.into(), CLIENT.into(), address.into()];
+    let address = server.map(|server| SocketAddr::new(GATEWAY[0], server.port()).to_string().into());
+    let command = [std::env::current_exe()?.into(), CLIENT.into()].into_iter().chain(address).collect();
+    let nodes = 2 + usize::from(setup.loopback);
     let plan = Plan {
         seed: 0,
         hosts: vec![HostPlan { name: CLIENT.to_owned(), setup, command, is_main: true, ready: None, output: Output::Lines }],
         gateway: Some(GatewayPlan { name: "world".to_owned(), name_server: None, listen: Vec::new() }),
-        links: LinkTable::uniform(2, link_from_keys(&[format!("delay={delay}")])?),
+        links: LinkTable::uniform(nodes, link_from_keys(&[format!("delay={delay}")])?),
         pacing: Pacing::Sleep,
         wishes: Wishes::default(),
         tolerance: Tolerance { limit: Duration::from_millis(1) },
