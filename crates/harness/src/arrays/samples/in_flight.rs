@@ -48,11 +48,13 @@ pub(super) struct Latest {
     place: u32,
     /// Lower bits of the sequence number of the next packet.
     next: u32,
+    /// Lower bits of the sequence number of the first packet that the packet stands for, or of the packet itself.
+    first: u16,
 }
 
 impl Latest {
     /// No packet. The first packet of a link waits for no other, so these numbers have no meaning.
-    pub(super) const NONE: Self = Self { place: 0, next: 0 };
+    pub(super) const NONE: Self = Self { place: 0, next: 0, first: 0 };
 }
 
 impl<const A: usize> Packet<A> {
@@ -119,9 +121,10 @@ impl<const A: usize> InFlight<A> {
         // Nobody can predict which packets follow, so there is no branch for them.
         let list = if !follows & (ticks >= HORIZON) { beyond(&mut self.beyond, at.0, ticks, false) } else { &mut self.wheel[spoke][0] };
         let (place, item) = self.packets.push_unless(follows, latest.place, list);
-        let stands_for = std::hint::select_unpredictable(follows, item.stands_for.wrapping_add(1), 0);
-        *item = Packet { stands_for, ..packet };
-        *latest = Latest { place, next: (packet.sequence as u32).wrapping_add(1) };
+        let first = std::hint::select_unpredictable(follows, latest.first, packet.sequence as u16);
+        // Nothing is read from the place, which is rarely in a cache.
+        *item = Packet { stands_for: (packet.sequence as u16).wrapping_sub(first), ..packet };
+        *latest = Latest { place, next: (packet.sequence as u32).wrapping_add(1), first };
     }
 
     /// Returns the number of ticks from the present tick to the tick at which a packet is due with this arrival, and the index of the latter in the wheel.

@@ -24,6 +24,8 @@ const WITNESSES: usize = 2;
 /// Largest sum of the omitted terms, relative to x.
 const TOLERANCE: f64 = 1e-14;
 
+/// 1.5·2^52. The sum with a smaller number leaves no bits for a fraction.
+const ROOM: f64 = 6_755_399_441_055_744.0;
 /// Number below which [`GammaMap::nearly`] gives 0: e⁻¹⁰⁰.
 const NOTHING: f64 = 3.7e-44;
 /// Largest sum of the omitted terms of [`GammaMap::nearly`], as a share of the mean of x.
@@ -81,13 +83,23 @@ impl GammaMap {
         if x.is_nan() { self.exactly(z) } else { x }
     }
 
-    /// Computes x(z) of several numbers with an error below 10⁻¹²·(x(z) + mean of x). NaN without such a series.
+    /// Computes x(z) of several numbers with an error below 10⁻¹²·(x(z) + mean of x). NaN without such a series, and in the outermost cells.
     #[inline(always)]
     pub(super) fn nearly<const N: usize>(&self, z: &[f64; N], x: &mut [f64; N]) {
         let cells = self.near.as_ref().unwrap_or(&self.cells);
-        // A loop instead of `for_each`: the compiler does not inline the fold of a zip, which would then be compiled for narrower registers than the caller's loop.
-        for (x, z) in x.iter_mut().zip(z) {
-            *x = sum(cells, *z);
+        let (mut places, mut offsets) = ([0; N], [0.0; N]);
+        // Loops instead of `for_each`: the compiler does not inline the fold of a zip, which would then be compiled for narrower registers than the caller's loop.
+        for ((place, offset), z) in places.iter_mut().zip(&mut offsets).zip(z) {
+            let position = (z + RANGE) * DENSITY - 0.5;
+            // The lower bits of `nearest` are the number of the cell, and the remainder is the offset from the cell's centre.
+            let nearest = position + ROOM;
+            *place = nearest.to_bits();
+            *offset = if z.abs() < RANGE - 1.0 / DENSITY { position - (nearest - ROOM) } else { f64::NAN };
+        }
+        for (x, (place, offset)) in x.iter_mut().zip(places.iter().zip(&offsets)) {
+            #[expect(clippy::cast_possible_truncation, reason = "the lower bits are the number of the cell")]
+            let cell = &cells[*place as usize % CELLS as usize];
+            *x = cell.sum(2.0 * offset);
         }
     }
 

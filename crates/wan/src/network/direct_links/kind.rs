@@ -27,6 +27,8 @@ pub(super) struct Kind {
     pub(super) chains: Option<Chains>,
     /// `true` if links of this kind have state.
     pub(super) remembers: bool,
+    /// `true` if the chain of delays is the only state of links of this kind.
+    pub(super) has_only_delays: bool,
     /// Threshold for a loss without state: the packet is lost if the upper 53 bits of its loss word are below the threshold.
     loses_below: u64,
 }
@@ -88,8 +90,10 @@ impl Kind {
         let remembers = matches!(line, Line::Queued(_))
             || matches!(loss, Losses::GilbertElliott(_) | Losses::InTime(_))
             || matches!(delay, Delays::Correlated(_));
+        let loses_alone = matches!(loss, Losses::None | Losses::Independent(_));
+        let has_only_delays = matches!((&delay, line), (Delays::Correlated(_), Line::Free(_))) && loses_alone;
         let loses_below = threshold(if let Losses::Independent(probability) = loss { probability } else { Probability::ZERO });
-        Some(Self { is_random: config.is_random(), keeps_order, loss, delay, line, chains, remembers, loses_below })
+        Some(Self { is_random: config.is_random(), keeps_order, loss, delay, line, chains, remembers, has_only_delays, loses_below })
     }
 
     /// Returns whether links that take turns between this kind and others need no more state than [`Remembered`]: a chain of delays, or a chain of losses
@@ -127,15 +131,27 @@ impl Kind {
         if let Line::Free(nanos) = self.line { now.saturating_add_nanos(nanos) } else { now }
     }
 
-    /// Computes the fate of a packet of a link without state that leaves the transmitter at `leaves`. `delay` is the packet's delay \[ns\], or
-    /// [`Law::UNKNOWN`] to draw the delay.
+    /// Computes the fate of a packet that leaves the transmitter at `leaves`, of a link without state, or with a chain of delays as its only state: `chain` is
+    /// the state and the next value of the chain, and the state is changed. `delay` is the packet's delay \[ns\], or [`Law::UNKNOWN`] to draw the delay.
     #[inline(always)]
-    pub(super) fn fate(&mut self, leaves: Instant, words: Words, packet: impl Fn() -> PacketDraws, delay: u64) -> Verdict {
+    pub(super) fn fate(
+        &mut self,
+        leaves: Instant,
+        chain: Option<(&mut Remembered, f64)>,
+        words: Words,
+        packet: impl Fn() -> PacketDraws,
+        delay: u64,
+    ) -> Verdict {
         if is_below(words[0], self.loses_below) {
             return Verdict::Lost;
         }
         if delay == Law::UNKNOWN {
-            return Verdict::Arrives(self.arrival(leaves, &mut { Remembered::NOTHING }, words, packet()));
+            let mut nothing = Remembered::NOTHING;
+            let link = chain.map_or(&mut nothing, |(link, _)| link);
+            return Verdict::Arrives(self.arrival(leaves, link, words, packet()));
+        }
+        if let Some((link, value)) = chain {
+            (link.normal, link.at) = (value, leaves);
         }
         Verdict::Arrives(leaves.saturating_add_nanos(delay))
     }

@@ -19,6 +19,7 @@ use switching::Switching;
 use super::id::LinkId;
 use crate::fates::fate::DropCause;
 use crate::fates::stats::LinkStats;
+use crate::laws::delay::Law;
 use crate::line::direct::{Direct, Words};
 use crate::line::model::LinkModel;
 use crate::line::name::LinkName;
@@ -268,9 +269,10 @@ impl DirectLinks {
             // A wrong value of `CHAINS` is slow, but gives the same answers.
             Some(_) => self.offer_one_by_one(now, first, count, excluded, arrivals),
             None if CHAINS => self.offer_one_by_one(now, first, count, excluded, arrivals),
-            None if !kind.remembers => alike::<false>(kind, (links, &mut []), span, excluded, arrivals),
+            None if !kind.remembers => alike::<false, false>(kind, (links, &mut []), span, excluded, arrivals),
             // Every link of the kind has an entry in `remembered`.
-            None => alike::<true>(kind, (links, &mut self.remembered[first..first + count]), span, excluded, arrivals),
+            None if kind.has_only_delays => alike::<true, false>(kind, (links, &mut self.remembered[first..first + count]), span, excluded, arrivals),
+            None => alike::<true, true>(kind, (links, &mut self.remembered[first..first + count]), span, excluded, arrivals),
         }
     }
 
@@ -435,10 +437,10 @@ impl Other {
     }
 }
 
-/// Offers a packet to each of these links of one kind, with state if `REMEMBER` is set. All draws come before all verdicts. The verdict is chosen by a constant
-/// rather than given as a closure, so the verdict is inlined into the loop.
+/// Offers a packet to each of these links of one kind, with state if `REMEMBER` is set, and with more state than the chain of delays if `MORE` is set, too. All
+/// draws come before all verdicts. The verdict is chosen by constants rather than given as a closure, so the verdict is inlined into the loop.
 #[inline(always)]
-fn alike<const REMEMBER: bool>(
+fn alike<const REMEMBER: bool, const MORE: bool>(
     kind: &mut Kind,
     (links, remembered): (&mut [LinkState], &mut [Remembered]),
     (now, until): (Instant, Instant),
@@ -455,12 +457,14 @@ fn alike<const REMEMBER: bool>(
             *words = link.draws.packet(link.offered).loss_and_jitter();
         }
     }
-    let (values, delays) = match REMEMBER {
+    let (values, mut delays) = match REMEMBER {
         true => kind.delays_of_chains(&chains, &words),
         false => ([f64::NAN; DirectLinks::AT_ONCE], kind.delays(&words)),
     };
-    let (mut bit, mut arrive, mut overtake, mut wait) = (1, 0, 0, 0);
     let leaves = kind.leaves(now);
+    // With more state, a packet may leave the transmitter later than `leaves`.
+    let held_back = if !MORE && kind.keeps_order { hold_back(links, leaves, &mut delays) } else { 0 };
+    let (mut bit, mut arrive, mut overtake, mut wait) = (1, 0, 0, 0);
     for place in 0..links.len().min(DirectLinks::AT_ONCE) {
         let (link, words) = (&mut links[place], words[place]);
         // An excluded link counts no packet, so its next packet has the same number and random words.
@@ -468,14 +472,16 @@ fn alike<const REMEMBER: bool>(
             // A closure, because only few packets need further draws, for which the parts of the address must be in memory.
             let (stream, number) = (link.draws, link.offered);
             let packet = move || stream.packet(number);
-            let verdict = match REMEMBER {
-                true => kind.verdict(now, &mut remembered[place], words, packet, (values[place], delays[place])),
-                false => kind.fate(leaves, words, packet, delays[place]),
+            let verdict = match (REMEMBER, MORE) {
+                (true, true) => kind.verdict(now, &mut remembered[place], words, packet, (values[place], delays[place])),
+                (true, false) => kind.fate(leaves, Some((&mut remembered[place], values[place])), words, packet, delays[place]),
+                (false, _) => kind.fate(leaves, None, words, packet, delays[place]),
             };
             link.offered += 1;
             match verdict {
                 Verdict::Arrives(wanted) => {
-                    let arrival = link.in_order(kind.keeps_order, wanted);
+                    let is_in_order = !MORE && delays[place] != Law::UNKNOWN;
+                    let arrival = link.in_order(kind.keeps_order && !is_in_order, wanted);
                     arrivals.at[place] = arrival;
                     arrive |= bit;
                     wait |= u8::from(arrival > wanted) << place;
@@ -487,7 +493,25 @@ fn alike<const REMEMBER: bool>(
         }
         bit = bit.wrapping_shl(1);
     }
-    (arrivals.arrive, arrivals.overtake, arrivals.wait) = (arrive, overtake, wait);
+    (arrivals.arrive, arrivals.overtake, arrivals.wait) = (arrive, overtake, wait | held_back & arrive);
+}
+
+/// Lengthens the delays \[ns\] of packets that leave the transmitters of these links at `leaves`, so that no packet arrives before the latest packet of its
+/// link. Returns one bit for each packet that waits. A delay that is not known yet stays unknown.
+///
+/// Nobody can predict which packets wait. Of comparisons in the loop over links the compiler made branches, and here it makes none.
+#[inline(always)]
+fn hold_back(links: &[LinkState], leaves: Instant, delays: &mut [u64; DirectLinks::AT_ONCE]) -> u8 {
+    let mut least = [0; DirectLinks::AT_ONCE];
+    for (least, link) in least.iter_mut().zip(links) {
+        *least = link.latest.as_nanos().saturating_sub(leaves.as_nanos());
+    }
+    let mut wait = 0;
+    for (place, (delay, least)) in delays.iter_mut().zip(least).enumerate() {
+        wait |= u8::from(least > *delay) << place;
+        *delay = least.max(*delay);
+    }
+    wait
 }
 
 impl Arrivals {
@@ -548,11 +572,11 @@ impl LinkState {
     /// Counts the arrival of a packet, and returns whether the packet overtakes an earlier packet.
     #[inline(always)]
     fn count_arrival(&mut self, now: Instant, until: Instant, at: Instant) -> bool {
-        // An arrival after the end of the run stays in flight for the counters, but counts for the order of arrivals.
-        if at <= until {
-            self.delivered += 1;
-            self.delay_nanos += u128::from(at.as_nanos() - now.as_nanos());
-        }
+        // An arrival after the end of the run stays in flight for the counters, but counts for the order of arrivals. There is no branch, because nobody can
+        // predict such an arrival if delays are not short compared with the run.
+        let is_counted = at <= until;
+        self.delivered += u64::from(is_counted);
+        self.delay_nanos += u128::from(core::hint::select_unpredictable(is_counted, at.as_nanos() - now.as_nanos(), 0));
         let overtakes = at < self.latest;
         self.latest = if overtakes { self.latest } else { at };
         overtakes

@@ -76,6 +76,27 @@ fn links_in_order_decide_what_whole_links_decide() {
     }
 }
 
+/// Links that are offered packets together: a packet has its bit exactly if the packet waits, whether its delay was computed with the others or alone.
+#[test]
+fn packets_that_wait_have_their_bits() {
+    let LinkModel::Fixed(config) = model("delay 24ms 9ms distribution normal loss 10%") else { panic!("words are a configuration") };
+    let in_order = LinkModel::from(LinkConfig { order: Order::InOrder, ..config });
+    let mut links = DirectLinks::new(Instant::MAX, OF_TESTS);
+    assert!((0..DirectLinks::AT_ONCE).all(|place| links.add(7, &LinkName::between("a", &place.to_string()), &in_order)));
+    let (mut arrivals, mut latest, mut waiting) = (Arrivals::NONE, [Instant::ZERO; DirectLinks::AT_ONCE], 0);
+    for number in 0..500 {
+        links.offer(Instant::from_nanos(number * 4_000_000), LinkId::new(0), DirectLinks::AT_ONCE, 0, &mut arrivals);
+        assert_eq!(arrivals.wait & !arrivals.arrive, 0);
+        for place in arrivals.places() {
+            // Two delays that lead to one nanosecond are too rare to be drawn.
+            assert_eq!(arrivals.waits(place), arrivals.at[place] == latest[place], "packet {number} of link {place}");
+            latest[place] = arrivals.at[place];
+        }
+        waiting += arrivals.wait.count_ones();
+    }
+    assert!(waiting > 1000, "{waiting} of 4000 packets");
+}
+
 #[test]
 fn they_decide_what_whole_links_decide() {
     let direct = DIRECT.map(model);
