@@ -9,9 +9,12 @@ use std::task::{Context, Poll, Waker};
 
 use super::Task;
 
+/// Place of the outcome of a task, which the program of the task and the handle share.
+type Place<T> = Rc<RefCell<State<T>>>;
+
 /// Handle of a task: a future for the outcome of the task. Dropping the handle does not stop the task.
 pub struct JoinHandle<T> {
-    state: Rc<RefCell<State<T>>>,
+    state: Place<T>,
     task: Weak<Task>,
 }
 
@@ -34,7 +37,7 @@ pub(crate) struct State<T> {
 }
 
 impl<T> JoinHandle<T> {
-    pub(super) const fn new(state: Rc<RefCell<State<T>>>, task: Weak<Task>) -> Self {
+    pub(super) const fn new(state: Place<T>, task: Weak<Task>) -> Self {
         Self { state, task }
     }
 
@@ -73,20 +76,46 @@ impl<T> Future for JoinHandle<T> {
 }
 
 /// Wraps `future` into a program that stores the output of `future`. Returns the program, and the place of the output.
-pub(crate) fn joined<F: Future>(future: F) -> (impl Future<Output = ()>, Rc<RefCell<State<F::Output>>>) {
+pub(crate) fn joined<F: Future>(future: Pin<Box<F>>) -> (Joined<F>, Place<F::Output>) {
     let state = Rc::new(RefCell::new(State { outcome: None, waker: None }));
-    // The guard reports the end to the waiting task, even if the program is dropped before its end.
-    let told = Told(Rc::clone(&state));
-    let program = async move {
-        let outcome = future.await;
-        told.0.borrow_mut().outcome = Some(Ok(outcome));
-        drop(told);
-    };
-    (program, state)
+    (Joined(Some(Unfinished { future, told: Told(Rc::clone(&state)) })), state)
+}
+
+/// Program that stores the output of a future; `None` once the future is over.
+///
+/// Not an `async` block, whose state would be looked up at each poll before the state of the future.
+pub(crate) struct Joined<F: Future>(Option<Unfinished<F>>);
+
+/// Future of a [`Joined`], with the guard that reports the end to the waiting task even if the program is dropped before its end.
+struct Unfinished<F: Future> {
+    // Fields are dropped in this order.
+    future: Pin<Box<F>>,
+    told: Told<F::Output>,
+}
+
+impl<F: Future> Future for Joined<F> {
+    type Output = ();
+
+    fn poll(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<()> {
+        let Some(unfinished) = &mut self.0 else { return Poll::Ready(()) };
+        let Poll::Ready(outcome) = unfinished.future.as_mut().poll(cx) else { return Poll::Pending };
+        if let Some(Unfinished { future, told }) = self.0.take() {
+            // The future is dropped first, so that the waiting task finds its sockets closed.
+            drop(future);
+            told.tell(outcome);
+        }
+        Poll::Ready(())
+    }
 }
 
 /// Guard that stores [`TaskStopped`] if there is no outcome, and wakes the waiting task.
-struct Told<T>(Rc<RefCell<State<T>>>);
+struct Told<T>(Place<T>);
+
+impl<T> Told<T> {
+    fn tell(self, outcome: T) {
+        self.0.borrow_mut().outcome = Some(Ok(outcome));
+    }
+}
 
 impl<T> Drop for Told<T> {
     fn drop(&mut self) {

@@ -163,17 +163,7 @@ impl Tasks {
         F::Output: 'static,
     {
         // The future is boxed by itself, because without optimisation the program around it would also be copied on the stack.
-        self.spawn_boxed(host, origin, Box::pin(future))
-    }
-
-    /// Translated by the compiler for each type of output, and not for each future.
-    fn spawn_boxed<T: 'static>(
-        &self,
-        host: Option<NodeId>,
-        origin: &'static Location<'static>,
-        future: Pin<Box<dyn Future<Output = T>>>,
-    ) -> JoinHandle<T> {
-        let (program, state) = joined(future);
+        let (program, state) = joined(Box::pin(future));
         let task = self.start(host, origin, Box::pin(program));
         JoinHandle::new(state, Rc::downgrade(&task))
     }
