@@ -1,5 +1,7 @@
 //! Schedule of the ticks of peers.
 
+use std::time::Duration;
+
 use cohaptic_peer::Clock;
 use cohaptic_units::Instant;
 use cohaptic_wan::{Event, EventQueue};
@@ -9,8 +11,8 @@ use crate::plan::Ticking;
 /// Instants of the scene at which peers tick.
 #[derive(Clone, Debug)]
 pub(crate) enum Schedule {
-    /// All peers tick together, every `nanos` nanoseconds, next at `next`.
-    Lockstep { nanos: u64, next: Instant },
+    /// All peers tick together, every `nanos` nanoseconds, which is the span `span`, next at `next`.
+    Lockstep { nanos: u64, span: Duration, next: Instant },
     /// An event for the next tick of each peer.
     EventDriven(Box<EventQueue<Tick>>),
 }
@@ -42,7 +44,7 @@ impl Schedule {
             Ticking::Lockstep => {
                 // In lockstep all clocks are equal, so the clock of the first peer is enough. No run is as long as the longest tick of 64 bits.
                 let nanos = clocks.next().and_then(|(_, clock)| u64::try_from(clock.tick.as_nanos()).ok()).unwrap_or(u64::MAX);
-                Self::Lockstep { nanos, next: Instant::ZERO }
+                Self::Lockstep { nanos, span: Duration::from_nanos(nanos), next: Instant::ZERO }
             }
             Ticking::EventDriven => {
                 let mut queue = EventQueue::new();

@@ -23,20 +23,22 @@ impl<const A: usize> State<A> {
     #[must_use]
     #[inline]
     pub fn is_finite(&self) -> bool {
-        !self.times_zero().is_nan()
-    }
-
-    /// Returns the sum of all components times zero: 0 if every component is a finite number, and NaN otherwise. A test of the sum over many states takes the
-    /// place of a test of each state.
-    #[must_use]
-    #[inline]
-    pub fn times_zero(&self) -> f64 {
         // 0·x is 0 for a finite x and NaN for any other x, and a sum with a NaN is NaN.
         let mut sum = 0.0;
         for axis in 0..A {
             sum += 0.0 * self.position[axis] + 0.0 * self.velocity[axis];
         }
-        sum
+        !sum.is_nan()
+    }
+
+    /// Adds the components of another state. A sum with a number that is not finite is not finite, so that a finite sum of many states takes the place of a
+    /// test of each state.
+    #[inline]
+    pub fn accumulate(&mut self, other: &Self) {
+        for axis in 0..A {
+            self.position[axis] += other.position[axis];
+            self.velocity[axis] += other.velocity[axis];
+        }
     }
 }
 

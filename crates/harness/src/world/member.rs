@@ -189,7 +189,11 @@ impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Memb
 
     #[inline]
     pub(super) fn is_finite(&self) -> bool {
-        !self.times_zero().is_nan() && self.turns_finitely()
+        let mut sum = State::REST;
+        self.add_states(&mut sum);
+        // The sum of finite states may overflow.
+        let are_finite = || self.peer.object().state().is_finite() && self.peer.device().state().is_finite();
+        (sum.is_finite() || are_finite()) && self.turns_finitely()
     }
 
     /// Returns whether the attitudes of the peer are finite; `true` without a rotation.
@@ -197,14 +201,14 @@ impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Memb
         self.peer.rotation().is_none_or(Rotation::is_finite)
     }
 
-    /// Returns the sum of [`State::times_zero`] of copy and device.
+    /// Adds the states of copy and device to `sum`.
     #[inline]
-    pub(super) fn times_zero(&self) -> f64 {
+    pub(super) fn add_states(&self, sum: &mut State<A>) {
         // One match arm for each kind, not a reference chosen by the match: each arm then reads a known address.
-        let device = match self.peer.device() {
-            DeviceModel::Unsimulated(device) => device.state().times_zero(),
-            DeviceModel::Simulated(device) => device.state().times_zero(),
-        };
-        self.peer.object().state().times_zero() + device
+        match self.peer.device() {
+            DeviceModel::Unsimulated(device) => sum.accumulate(&device.state()),
+            DeviceModel::Simulated(device) => sum.accumulate(&device.state()),
+        }
+        sum.accumulate(self.peer.object().state());
     }
 }

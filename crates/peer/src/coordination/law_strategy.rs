@@ -17,6 +17,8 @@ pub struct LawStrategy<const A: usize> {
     memory: Vec<f64>,
     /// Own states of the latest ticks, for a law with a lag. Such a law has no other memory.
     past: Option<Past<A>>,
+    /// `true` if the law has neither a memory nor a lag, so that [`LawStrategy::at_once`] is its command.
+    is_of_the_present: bool,
 }
 
 impl<const A: usize> LawStrategy<A> {
@@ -32,13 +34,14 @@ impl<const A: usize> LawStrategy<A> {
         let lag = Law::<f64>::lag(&law);
         debug_assert!(lag == 0 || memory.is_empty(), "a law that looks back remembers nothing else");
         let past = (lag > 0).then(|| Past::new(lag));
-        Self { coordination, parameters, law, memory, past }
+        let is_of_the_present = memory.is_empty() && past.is_none();
+        Self { coordination, parameters, law, memory, past, is_of_the_present }
     }
 
     /// Returns whether the law has neither a memory nor a lag, so that [`LawStrategy::at_once`] is its command.
     #[inline(always)]
-    pub(super) fn is_of_the_present(&self) -> bool {
-        self.memory.is_empty() && self.past.is_none()
+    pub(super) const fn is_of_the_present(&self) -> bool {
+        self.is_of_the_present
     }
 
     /// Returns the command of a law without memory and lag.
