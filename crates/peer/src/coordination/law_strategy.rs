@@ -96,6 +96,7 @@ impl<const A: usize> Strategy<A> for LawStrategy<A> {
             (Some(past), lag @ 1..) => past.set_lag(lag),
             (past, lag) => *past = (lag > 0).then(|| Past::new(lag)),
         }
+        self.is_of_the_present = self.memory.is_empty() && self.past.is_none();
     }
 
     fn memory(&self) -> &[f64] {
