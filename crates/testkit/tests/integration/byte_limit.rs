@@ -296,5 +296,5 @@ fn a_gibibyte_is_the_limit_that_is_not_said() {
             }
         });
     });
-    says("not said", &text, &["its limit is 1073741824: "]);
+    says("not said", &text, &["its limit is 1073741824 bytes. "]);
 }
