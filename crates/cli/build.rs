@@ -2,7 +2,6 @@
 //!
 //! Tests start the program three thousand times. At any other address the loader writes 160,000 pointers, so that half of the page faults of a start, and a
 //! quarter of its processor time, are relocation. Programs that people use keep their random addresses.
-#![expect(clippy::print_stdout, reason = "Cargo reads the output")]
 
 use std::env;
 
