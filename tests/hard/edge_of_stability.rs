@@ -1,4 +1,5 @@
-//! Gains a ten-thousandth below and above the edge of stability, for a million ticks, by day for a quarter of them: the simulation decays and grows by the spectral radius, frame by frame.
+//! Gains a ten-thousandth below and above the edge of stability, for a million ticks, by day for a quarter of them: the simulation decays and grows by the
+//! spectral radius, frame by frame.
 //!
 //! With w a left eigenvector of the tick's matrix A, w·A = λ·w, the component c = w·s of the state obeys c⁺ = λ·c, however little else has died out. What comes
 //! between, per frame and relative to |c|, is at most
