@@ -130,3 +130,34 @@ fn place(index: u32) -> Place {
 const fn parts(place: Place) -> (u32, NodeId) {
     ((place >> RECEIVER_BITS) as u32, NodeId(place as u16))
 }
+
+#[cfg(test)]
+mod tests {
+    use alloc::rc::Rc;
+    use alloc::vec::Vec;
+
+    use super::*;
+
+    /// An entry lives until its last packet, and an entry without packets until it is closed: nothing of a broadcast stays behind.
+    #[test]
+    fn an_entry_ends_with_its_last_packet() {
+        let payload = Rc::new(());
+        let sent = Sent { now: Instant::ZERO, from: NodeId(1), size: SizeAndMarks::NOTHING, payload: &payload };
+        let mut sendings = Sendings::new();
+        let empty = sendings.open(&sent, LinkId::new(4), 7);
+        sendings.close(&empty);
+        assert_eq!(Rc::strong_count(&payload), 1);
+        let mut open = sendings.open(&sent, LinkId::new(4), 8);
+        let places: Vec<_> = [0, 2, 3].map(|to| open.add(NodeId(to))).into();
+        sendings.close(&open);
+        for (place, to) in places.iter().zip([0, 2, 3]) {
+            let taken = sendings.take(Instant::ZERO, *place).unwrap();
+            assert_eq!(
+                (taken.path, taken.turn.link(), taken.sequence),
+                (Path { from: NodeId(1), to: NodeId(to) }, LinkId::new(4 + usize::from(to)), 8)
+            );
+        }
+        assert_eq!(Rc::strong_count(&payload), 1);
+        assert!(sendings.take(Instant::ZERO, places[0]).is_none());
+    }
+}
