@@ -53,10 +53,13 @@ impl Scoreboard {
             // The entry is decided: the segment was just marked, has arrived, or was sent again and has a later entry.
             self.by_time.pop_front();
         }
-        // The last transmission before `delivered` has the last deadline, so that one timer covers all waiting segments.
+        // The last undecided transmission before `delivered` has the last deadline, so that one timer covers all waiting segments. Linux leaves out arrived
+        // segments too: its list of transmissions loses each of them on arrival.
         let before = self.by_time.partition_point(|(sent_at, _)| *sent_at < delivered);
-        let last = self.by_time.range(..before).next_back()?;
-        Some(last.0.0.saturating_add(patience))
+        let last = self.by_time.range(..before).rposition(|&(sent_at, end)| self.undecided(sent_at, end).is_some())?;
+        // The decided entries behind it are removed, so that the next search does not pass over them again.
+        self.by_time.drain(last + 1..before);
+        Some(self.by_time[last].0.0.saturating_add(patience))
     }
 
     /// Returns the index of the segment that ends at `end` if `sent_at` is its last transmission, and the fate of this transmission is unknown.
