@@ -4,3 +4,4 @@
 mod integration;
 #[cfg(target_os = "linux")]
 mod pages;
+mod process;

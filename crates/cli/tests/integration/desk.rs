@@ -8,6 +8,8 @@ use std::time::Duration;
 use serde_json::Value;
 use tempfile::TempDir;
 
+use crate::process::output;
+
 /// A folder of its own for one test, removed at the end.
 pub(crate) struct Desk(TempDir);
 
@@ -76,7 +78,12 @@ impl Desk {
     /// Like `cohaptic`, but ends a command that takes longer than `patience`, which then has no status. For commands that would not end if they were not
     /// refused.
     pub(crate) fn cohaptic_within(&self, patience: Duration, line: &str) -> Outcome {
-        Outcome::of(assert_cmd::Command::from_std(self.command(line)).timeout(patience).output().unwrap())
+        Outcome::of(output(&mut self.command(line), b"", patience))
+    }
+
+    /// Like `cohaptic`, with these bytes on standard input.
+    pub(crate) fn piped(&self, line: &str, input: impl AsRef<[u8]>) -> Outcome {
+        Outcome::of(output(&mut self.command(line), input.as_ref(), AT_MOST))
     }
 
     /// Returns the output of a command, which must succeed. Standard error may name the files written and the expected duration, which depends on the machine,

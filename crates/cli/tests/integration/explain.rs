@@ -176,8 +176,7 @@ fn people_get_a_table_and_a_picture_of_the_costs() {
 #[test]
 fn standard_input_is_read_once_for_all_methods() {
     let desk = Desk::new();
-    let mut command = assert_cmd::Command::from_std(desk.command("explain - --cost --json"));
-    let outcome = crate::integration::desk::Outcome::of(command.write_stdin(TWO).output().unwrap());
+    let outcome = desk.piped("explain - --cost --json", TWO);
     assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
     let axes: Vec<Value> = crate::integration::desk::parse(&outcome.stdout)["cost_measured"]
         .as_array()

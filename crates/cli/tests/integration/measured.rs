@@ -3,8 +3,7 @@
 #![expect(clippy::print_stdout, reason = "a test that is skipped says why")]
 
 use std::path::{Path, PathBuf};
-
-use assert_cmd::Command;
+use std::process::Command;
 
 use crate::integration::desk::{Desk, Outcome, parse};
 

@@ -94,6 +94,5 @@ fn there_is_a_manual_page_of_every_command() {
 fn what_init_prints_can_be_run() {
     let desk = Desk::with("two.toml", TWO);
     let scene = desk.text("init - --from network/ideal");
-    let output = assert_cmd::Command::from_std(desk.command("run - --json")).write_stdin(scene).output().unwrap();
-    assert_eq!(output.status.code(), Some(0));
+    assert_eq!(desk.piped("run - --json", scene).status, Some(0));
 }

@@ -3,12 +3,13 @@
 use std::fs;
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::PathBuf;
+use std::process::Command;
 use std::time::Duration;
 
-use assert_cmd::Command;
 use tempfile::TempDir;
 
 use crate::pages::root;
+use crate::process::output;
 
 /// A command of a page that takes longer hangs. The longest one takes 3 minutes on a quiet machine with two cores, and more than 5 beside other programs.
 const AT_MOST: Duration = Duration::from_secs(1800);
@@ -65,7 +66,8 @@ impl Folder {
         let log = self.path("statuses");
         fs::write(&log, "").unwrap();
         let path = std::env::var("PATH").unwrap_or_default();
-        let output = Command::new("sh")
+        let mut command = Command::new("sh");
+        command
             .args(["-c", &format!("exec 2>&1\n{script}")])
             .current_dir(self.path("desk"))
             .env("PATH", format!("{}:{path}", self.path("bin").display()))
@@ -73,10 +75,8 @@ impl Folder {
             .env("COHAPTIC_PAGES_PROGRAM", env!("CARGO_BIN_EXE_cohaptic"))
             .env("COHAPTIC_PAGES_RUN_WITH", run_with)
             .env("COHAPTIC_PAGES_STATUSES", &log)
-            .env_remove("COLUMNS")
-            .timeout(AT_MOST)
-            .output()
-            .unwrap();
+            .env_remove("COLUMNS");
+        let output = output(&mut command, b"", AT_MOST);
         let statuses = fs::read_to_string(&log).unwrap().lines().map(|line| line.parse().unwrap()).collect();
         Outcome { printed: String::from_utf8(output.stdout).unwrap(), statuses, status: output.status.code() }
     }
