@@ -86,12 +86,6 @@ pub(crate) fn expect_running(what: &str) -> Running {
     running().unwrap_or_else(|| panic!("{}", outside_text(what)))
 }
 
-/// Looks at the state of the running test bed of this thread. Returns `None` if no test bed runs, or `look` finds nothing.
-#[inline]
-pub(crate) fn look<T>(look: impl FnOnce(&Shared) -> Option<T>) -> Option<T> {
-    RUNNING.with_borrow(|running| look(&running.as_ref()?.shared))
-}
-
 /// Asks the state of the running test bed of this thread. `what` completes the message of the panic.
 ///
 /// # Panics

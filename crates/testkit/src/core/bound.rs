@@ -51,6 +51,10 @@ impl Bound {
     /// Returns the sockets of `port`, or `None` if no socket is bound there.
     #[inline]
     pub(super) fn at(&self, port: Port) -> Option<&AtPort> {
+        // Most hosts have one socket.
+        if let Some(first) = self.0.first().filter(|first| first.port == port) {
+            return Some(first);
+        }
         self.0.get(self.0.partition_point(|at| at.port < port)).filter(|at| at.port == port)
     }
 

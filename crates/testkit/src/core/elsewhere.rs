@@ -64,8 +64,11 @@ impl Shared {
     /// As [`Shared::check_open`].
     #[inline(always)]
     pub(crate) fn open<T>(&self, host: NodeId, kind: &str, ask: impl FnOnce(&mut Core) -> T) -> io::Result<T> {
-        let visit = if self.is_at_hand() { None } else { Some(self.check_open(host, kind).map(|()| self.visit())?) };
-        Ok(self.ask(visit, ask))
+        let asked = match self.at_hand() {
+            Some(asked) => asked,
+            None => self.check_open(host, kind).map(|()| self.visit())?,
+        };
+        Ok(asked.answer(ask))
     }
 
     /// Checks that a value of the host `host` may be used on this thread now. `kind` names the value in the error.
@@ -76,7 +79,7 @@ impl Shared {
     /// then fails as well.
     #[inline]
     pub(crate) fn check_open(&self, host: NodeId, kind: &str) -> io::Result<()> {
-        if self.is_at_hand() || self.is_running() { Ok(()) } else { self.refuse(host, kind) }
+        if self.is_running() { Ok(()) } else { self.refuse(host, kind) }
     }
 
     #[cold]

@@ -49,7 +49,7 @@ use sockets::Sockets;
 use waking::Woken;
 
 pub(crate) use passing::Outgoing;
-pub(crate) use shared::{Clock, Shared};
+pub(crate) use shared::{Clock, Shared, counted_now};
 pub(crate) use socket_name::SocketName;
 #[cfg(feature = "tcp")]
 pub(crate) use tcp::{ConnId, HoldId, Inherited, ListenId, Sharing};
@@ -78,6 +78,8 @@ pub(crate) struct Core {
     face: Arc<Face>,
     /// Number of the run whose state this is. 0 until [`Shared`] gives the number.
     run: u64,
+    /// Number of the run while the state lies with the thread of the run, at the time of the run's clock; otherwise 0.
+    at_hand: u64,
 }
 
 pub(crate) type Parcel = wire::Parcel<Ends>;
@@ -114,6 +116,7 @@ impl Core {
             unix: unix::Unix::default(),
             woken: Woken::default(),
             run: 0,
+            at_hand: 0,
         }
     }
 

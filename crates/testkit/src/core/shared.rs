@@ -1,16 +1,17 @@
 //! Access of tasks to the state machine.
 //!
-//! During a run the state lies with the thread that polls the tasks, and each call borrows the state there. [`Shared::with`] is the only way to the state. A
-//! borrow takes a few instructions and no atomic operation, where a mutex takes two. Each datagram borrows three times: for sending, for receiving, and for
-//! the next wait of the reader. Other threads have no part in a run: see [`elsewhere`](super::elsewhere).
+//! During a run the state lies with the thread that polls the tasks. Each call takes the state out of its place there, and puts the state back.
+//! [`Shared::with`] is the only way to the state. A call takes a few instructions and no atomic operation, where a mutex takes two. Each datagram asks three
+//! times: for sending, for receiving, and for the next wait of the reader. Other threads have no part in a run: see [`elsewhere`](super::elsewhere).
 //!
 //! Before and after the run the state lies behind the mutex `home`. If other threads read the state during the run, the state stays in `home` all the time: the
 //! watchdog reads the record while a task occupies the thread of the run.
 
-use std::cell::{Cell, RefCell};
+use std::cell::Cell;
 use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::task::Waker;
 use std::time::Duration;
 
 use cohaptic_units::Instant;
@@ -22,11 +23,41 @@ use crate::names::Names;
 use crate::wire::Recorded;
 
 thread_local! {
-    /// State of the run whose tasks this thread polls. `ManuallyDrop`, because a thread-local value that needs no drop is accessed without a check whether it
-    /// was dropped. [`Stay`] takes the state away before the thread ends.
-    static HERE: RefCell<ManuallyDrop<Option<Box<Core>>>> = const { RefCell::new(ManuallyDrop::new(None)) };
-    /// Number of the run whose state lies in `HERE` at the time of the run's clock; 0 if there is no such run.
-    static AT_HAND: Cell<u64> = const { Cell::new(0) };
+    /// State of the run whose tasks this thread polls; `None` while a state answers on this thread. `ManuallyDrop`, because a thread-local value that needs no
+    /// drop is accessed without a check whether it was dropped. [`Stay`] takes the state away before the thread ends.
+    static HERE: Cell<ManuallyDrop<Option<Box<Core>>>> = const { Cell::new(ManuallyDrop::new(None)) };
+    /// `true` if a state lies in `HERE`, or was taken out of `HERE` or of its home to answer on this thread.
+    static LIES: Cell<bool> = const { Cell::new(false) };
+}
+
+#[inline(always)]
+fn take_here() -> Option<Box<Core>> {
+    ManuallyDrop::into_inner(HERE.take())
+}
+
+#[inline(always)]
+fn put_here(core: Option<Box<Core>>) {
+    HERE.set(ManuallyDrop::new(core));
+}
+
+/// Calls `look` on the state that lies with this thread and does not answer at present, if any.
+#[inline(always)]
+fn look_here<T>(look: impl FnOnce(Option<&mut Core>) -> T) -> T {
+    let mut core = take_here();
+    let seen = look(core.as_deref_mut());
+    put_here(core);
+    seen
+}
+
+/// Counts a call of a program, and returns the time of the run whose state is at hand. Returns `None` if no state is at hand, or there are too many calls.
+#[inline]
+pub(crate) fn counted_now() -> Option<Instant> {
+    look_here(|core| core.filter(|core| core.at_hand != 0 && core.face.count_call()).map(|core| core.now()))
+}
+
+/// Returns whether a state answers on this thread.
+fn is_asked() -> bool {
+    LIES.get() && look_here(|core| core.is_none())
 }
 
 /// Owner of the state machine. The values of tasks, such as sockets, reach the state through this type.
@@ -120,12 +151,6 @@ impl Shared {
         }
     }
 
-    /// Returns whether the state lies with this thread, at the time of the clock. Until the executor goes on, only this thread changes the state.
-    #[inline]
-    pub(crate) fn is_at_hand(&self) -> bool {
-        AT_HAND.get() == self.run
-    }
-
     /// Returns the number of the run.
     pub(crate) const fn run(&self) -> u64 {
         self.run
@@ -159,12 +184,6 @@ impl Shared {
         if self.is_synced() { self.face.now() } else { self.asked_now() }
     }
 
-    /// Counts a call of a program, and returns the time of the run. Returns `None` if the clock must be asked, or there are too many calls.
-    #[inline]
-    pub(crate) fn counted_now(&self) -> Option<Instant> {
-        (self.is_synced() && self.face.count_call()).then(|| self.face.now())
-    }
-
     /// Returns the time of the run after asking the clock.
     #[inline(never)]
     fn asked_now(&self) -> Instant {
@@ -180,9 +199,11 @@ impl Shared {
         }
         self.is_synced.store(true, Ordering::Relaxed);
         // A state that other threads read stays behind the lock and is never at hand.
-        if !self.stays {
-            AT_HAND.set(self.run);
-        }
+        look_here(|core| {
+            if let Some(core) = core {
+                core.at_hand = self.run;
+            }
+        });
         if let Some(moved) = moved {
             self.with(|core| core.pass_until(moved));
         }
@@ -230,39 +251,32 @@ impl Shared {
         None
     }
 
-    /// Asks the state, at the present instant. Tasks that the question wakes are woken after the answer, when the borrow has ended.
+    /// Asks the state, at the present instant. Tasks that the question wakes are woken after the answer, when the state is back in its place.
     ///
     /// # Panics
     ///
     /// On another thread while the run goes on, or if `ask` itself asks the state.
     #[inline(always)]
     pub(crate) fn with<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> T {
-        self.ask(if self.is_at_hand() { None } else { Some(self.visit()) }, ask)
+        self.at_hand().unwrap_or_else(|| self.visit()).answer(ask)
     }
 
-    /// Asks the state, which is at hand or here for a visit.
+    /// Takes the state for one answer, if the state lies with this thread at the time of the clock. Until the executor goes on, only this thread changes the
+    /// state.
     #[inline(always)]
-    pub(super) fn ask<T>(&self, visit: Option<Visit<'_>>, ask: impl FnOnce(&mut Core) -> T) -> T {
-        let mut woken = None;
-        let outcome = HERE.with_borrow_mut(|here| {
-            let core = here.as_mut().expect("the state was brought here");
-            let outcome = ask(core);
-            woken = core.woken.take();
-            outcome
-        });
-        // The state goes home before the wakers run: a waker may ask the state.
-        if let Some(visit) = visit {
-            drop(visit);
+    pub(super) fn at_hand(&self) -> Option<Asked<'_>> {
+        match take_here() {
+            Some(core) if core.at_hand == self.run => Some(Asked { core: Some(core), visit: None }),
+            other => {
+                put_here(other);
+                None
+            }
         }
-        if let Some(woken) = woken {
-            woken.wake();
-        }
-        outcome
     }
 
     /// Returns whether [`Shared::with`] may be called. It may not on another thread while the run goes on, nor while a state answers on this thread.
     pub(super) fn may_be_asked(&self) -> bool {
-        (self.is_at_hand() || self.may_be_had()) && HERE.with(|here| here.try_borrow().is_ok())
+        self.may_be_had() && !is_asked()
     }
 
     /// Like [`Shared::with`], but returns `None` if the state may not be accessed now.
@@ -270,27 +284,33 @@ impl Shared {
         self.may_be_asked().then(|| self.with(ask))
     }
 
-    /// Brings the state to this thread for one access, unless the state is on this thread already, and lets time pass until the time of the clock.
+    /// Takes the state for one answer where the state is not at hand, and lets time pass until the time of the clock.
     #[inline(never)]
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
-    pub(super) fn visit(&self) -> Visit<'_> {
+    pub(super) fn visit(&self) -> Asked<'_> {
+        assert!(!is_asked(), "the state of a run is asked while a state answers on this thread");
         // The state may lie here and not be at hand: then only tokio's clock may have moved since the last access.
-        let is_here = HERE.with_borrow(|here| here.as_ref().is_some_and(|core| core.run == self.run));
+        let is_here = look_here(|core| core.is_some_and(|core| core.run == self.run));
         if !is_here && !self.may_be_had() {
             panic!("{}", self.note_misuse("a test bed"));
         }
-        let mut visit = Visit { home: None, other: None };
-        if !is_here {
+        #[cfg(feature = "tokio")]
+        let ahead = self.ahead();
+        let (core, visit) = if is_here {
+            (take_here(), None)
+        } else {
             // The lock of `home` is held during the whole visit, so that another thread waits until the state is back.
             let mut home = self.lock_home();
-            visit.other = HERE.with_borrow_mut(|here| std::mem::replace(&mut **here, home.take()));
-            visit.home = Some(home);
-        }
+            (home.take(), Some(Visit { home, other: take_here(), lies: LIES.replace(true) }))
+        };
+        let mut asked = Asked { core, visit };
+        let core = asked.core();
+        core.woken.is_work_left = true;
         #[cfg(feature = "tokio")]
-        if let Some(now) = self.ahead() {
-            HERE.with_borrow_mut(|here| here.as_mut().expect("no other thread has the state").pass_until(now));
+        if let Some(now) = ahead {
+            core.pass_until(now);
         }
-        visit
+        asked
     }
 
     /// Returns the time of tokio's clock if the clock may be ahead of the state.
@@ -311,31 +331,81 @@ impl Shared {
     /// the state.
     pub(crate) fn stay(&self) -> Stay<'_> {
         if !self.stays {
-            let core = self.lock_home().take();
-            HERE.with_borrow_mut(|here| **here = core);
+            let mut core = self.lock_home().take();
             // With tokio's clock the state is at hand only while a guard of `sync` exists.
-            if matches!(self.clock, Clock::Own) {
-                AT_HAND.set(self.run);
+            if let Some(core) = &mut core
+                && matches!(self.clock, Clock::Own)
+            {
+                core.at_hand = self.run;
             }
+            put_here(core);
+            LIES.set(true);
         }
         Stay(self)
     }
 }
 
-/// Guard of one access to the state of the run. The state stays on this thread until the guard is dropped.
-pub(super) struct Visit<'a> {
-    /// Lock of the place to which the state returns; `None` if the state stays here.
-    home: Option<MutexGuard<'a, Option<Box<Core>>>>,
-    /// State of another run that lay here before. This happens when a task drops a socket of a run that has ended.
-    other: Option<Box<Core>>,
+/// State of a run that was taken out of its place for one answer. Its place is empty meanwhile, so that a second question of the same thread finds no state.
+pub(super) struct Asked<'a> {
+    /// The state, until the end of the answer.
+    core: Option<Box<Core>>,
+    /// `None` if the state was taken out of `HERE`.
+    visit: Option<Visit<'a>>,
 }
 
-impl Drop for Visit<'_> {
+/// Visit of a state that lies at home.
+struct Visit<'a> {
+    /// Lock of the home, to which the state returns.
+    home: MutexGuard<'a, Option<Box<Core>>>,
+    /// State of another run that lay here before. This happens when a task drops a socket of a run that has ended.
+    other: Option<Box<Core>>,
+    /// Value of `LIES` before the visit.
+    lies: bool,
+}
+
+impl Asked<'_> {
+    #[inline(always)]
+    fn core(&mut self) -> &mut Core {
+        self.core.as_mut().expect("the state is there until the end of the answer")
+    }
+
+    /// Asks the state, puts the state back, and calls the wakers of the tasks that the question woke.
+    #[inline(always)]
+    pub(super) fn answer<T>(mut self, ask: impl FnOnce(&mut Core) -> T) -> T {
+        let core = self.core();
+        let outcome = ask(core);
+        if core.woken.is_work_left {
+            self.end();
+        } else {
+            // The mark is set for each visit, so this state lay here. The usual end of an answer is this one check.
+            put_here(self.core.take());
+            std::mem::forget(self);
+        }
+        outcome
+    }
+
+    #[inline(never)]
+    fn end(mut self) {
+        let woken = self.core().woken.take();
+        // The state goes back before the wakers run: a waker may ask the state.
+        drop(self);
+        woken.into_iter().for_each(Waker::wake);
+    }
+}
+
+impl Drop for Asked<'_> {
+    /// Puts the state back, also after a panic of the question.
     #[inline(never)]
     fn drop(&mut self) {
-        if let Some(home) = &mut self.home {
-            // The state goes home, and the state that lay here before the visit comes back.
-            **home = HERE.with_borrow_mut(|here| std::mem::replace(&mut **here, self.other.take()));
+        let core = self.core.take();
+        match self.visit.take() {
+            None => put_here(core),
+            Some(Visit { mut home, other, lies }) => {
+                // The state goes home, and the state that lay here before the visit comes back.
+                *home = core;
+                put_here(other);
+                LIES.set(lies);
+            }
         }
     }
 }
@@ -345,8 +415,9 @@ pub(crate) struct Stay<'a>(&'a Shared);
 
 impl Drop for Stay<'_> {
     fn drop(&mut self) {
-        AT_HAND.set(0);
-        if let Some(core) = HERE.with_borrow_mut(|here| here.take()) {
+        LIES.set(false);
+        if let Some(mut core) = take_here() {
+            core.at_hand = 0;
             *self.0.lock_home() = Some(core);
         }
     }
@@ -360,6 +431,10 @@ pub(crate) struct Synced<'a>(&'a Shared);
 impl Drop for Synced<'_> {
     fn drop(&mut self) {
         self.0.is_synced.store(false, Ordering::Relaxed);
-        AT_HAND.set(0);
+        look_here(|core| {
+            if let Some(core) = core {
+                core.at_hand = 0;
+            }
+        });
     }
 }

@@ -184,7 +184,7 @@ mod tests {
                     let expected: Vec<u64> = std::mem::replace(&mut tree, later).into_values().collect();
                     now = now.max(next.as_nanos());
                     timers.fire(next, &mut woken);
-                    woken.take().into_iter().for_each(|woken| woken.wake());
+                    woken.take().into_iter().for_each(Waker::wake);
                     prop_assert_eq!(std::mem::take(&mut *gone_off.lock().unwrap()), expected);
                 }
                 prop_assert_eq!(timers.next(), tree.first_key_value().map(|((deadline, _), _)| *deadline));

@@ -86,6 +86,8 @@ impl Waiters {
 pub(crate) struct Woken {
     /// Foreign wakers that were not called yet.
     later: Vec<Waker>,
+    /// `true` if something is left to do after the answer of the state: wakers to call, or a state to bring home.
+    pub(super) is_work_left: bool,
     /// Table of the wakers of the executor of this crate.
     own: Option<&'static RawWakerVTable>,
 }
@@ -110,6 +112,7 @@ impl Woken {
     #[inline(never)]
     fn wake_later(&mut self, waker: &Waker) {
         self.later.push(waker.clone());
+        self.is_work_left = true;
     }
 
     /// Calls the waker now if it is trusted, otherwise after the borrow.
@@ -118,6 +121,7 @@ impl Woken {
             waker.wake();
         } else {
             self.later.push(waker);
+            self.is_work_left = true;
         }
     }
 
@@ -127,26 +131,9 @@ impl Woken {
         !self.later.is_empty()
     }
 
-    /// Takes the wakers to call after the borrow, or returns `None` if there are none.
-    #[inline]
-    pub(super) fn take(&mut self) -> Option<Box<ToWake>> {
-        // Most borrows wake no foreign task, and cost only this check.
-        if self.later.is_empty() { None } else { Some(self.take_later()) }
-    }
-
-    #[inline(never)]
-    fn take_later(&mut self) -> Box<ToWake> {
-        Box::new(ToWake(std::mem::take(&mut self.later)))
-    }
-}
-
-/// Wakers to call, now that the borrow of the state has ended. Boxed by [`Woken::take`], because nearly every access to the state wakes no foreign task, and
-/// an absent box is a null pointer in a register.
-pub(super) struct ToWake(Vec<Waker>);
-
-impl ToWake {
-    #[cold]
-    pub(super) fn wake(self) {
-        self.0.into_iter().for_each(Waker::wake);
+    /// Takes the wakers to call after the answer of the state.
+    pub(super) fn take(&mut self) -> Vec<Waker> {
+        self.is_work_left = false;
+        std::mem::take(&mut self.later)
     }
 }
