@@ -65,6 +65,8 @@ pub struct Peer<const A: usize, D, S> {
     asked: Asked,
     /// `true` if a tick has none of its optional parts: see [`Peer::is_without_parts`].
     is_plain: bool,
+    /// `true` if the contact is a grasp, the most frequent contact.
+    is_grasping: bool,
     held: Held<A>,
     /// Sum of the displacements of each sender. The positions in `held` are these sums. `None` for a peer without sums. Boxed, because only a server of clients
     /// that send displacements has sums.
@@ -145,6 +147,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         let exchanged = (config.exchange != Exchange::EACH_TICK).then(|| Box::new(Exchanged::new(device.state())));
         let tick_nanos = u64::try_from(config.tick.as_nanos()).unwrap_or(u64::MAX);
         let (computed, applied) = (none, none);
+        let is_grasping = matches!(config.contact, Contact::Grasp);
         let mut peer = Self {
             config,
             device,
@@ -152,6 +155,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
             strategy,
             asked,
             is_plain: false,
+            is_grasping,
             held,
             increments,
             rotation,
@@ -324,15 +328,44 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// Step 4: moves to the next tick, `span` after `now`.
     #[inline(always)]
     pub fn advance(&mut self, now: Instant, span: Duration) {
+        self.advance_as::<false>(now, span);
+    }
+
+    /// Moves to the next tick. With `PLAIN` the peer has no optional part.
+    #[inline(always)]
+    fn advance_as<const PLAIN: bool>(&mut self, now: Instant, span: Duration) {
         self.device.advance(now, span, self.applied.coupling);
         // The copy of a client is the state of the server, without dynamics.
-        if self.asked.role == Role::Copy {
+        if PLAIN || self.asked.role == Role::Copy {
             self.object.advance(span, self.applied.on_object);
         }
-        if let Some(rotation) = &mut self.rotation {
+        if let Some(rotation) = self.rotation.as_mut().filter(|_| !PLAIN) {
             rotation.advance(now, span);
         }
         self.local_time = self.local_time.saturating_add_nanos(self.tick_nanos);
+    }
+
+    /// Steps 3 and 4: [`Peer::compute_over`] and [`Peer::advance`], with one test for optional parts. Returns the position of the copy at the tick, before the
+    /// motion \[m\].
+    #[inline(always)]
+    pub fn tick(&mut self, now: Instant, span: Duration) -> [f64; A] {
+        if self.is_plain { self.tick_as::<true>(now, span) } else { self.tick_with_parts(now, span) }
+    }
+
+    /// Computes and moves with optional parts. Not inlined and cold, like [`Peer::compute_with_parts`].
+    #[cold]
+    #[inline(never)]
+    fn tick_with_parts(&mut self, now: Instant, span: Duration) -> [f64; A] {
+        self.tick_as::<false>(now, span)
+    }
+
+    #[inline(always)]
+    fn tick_as<const PLAIN: bool>(&mut self, now: Instant, span: Duration) -> [f64; A] {
+        self.compute_as::<PLAIN>(now, span);
+        // Read after the forces: a client has taken its copy from the server by then.
+        let position = self.object.state().position;
+        self.advance_as::<PLAIN>(now, span);
+        position
     }
 
     /// Returns the time on the peer's own clock: 0 at the first tick, and one period more at each following tick.
@@ -496,6 +529,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// Sets the contact between device and copy, from the next tick on.
     pub const fn set_contact(&mut self, contact: Contact) {
         self.config.contact = contact;
+        self.is_grasping = matches!(contact, Contact::Grasp);
     }
 
     /// Returns the parts that [`crate::Ages`] change: own state, held samples, the flag of a stale mean, and the rotation.
@@ -527,9 +561,9 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     fn coupling_force(&self, device: &State<A>, object: &State<A>) -> [f64; A] {
         let PeerConfig { contact, coupling, .. } = &self.config;
         let force = |contact: Contact, axis| contact.force_along(axis, coupling, device.along(axis).relative_to(object.along(axis)));
-        // The most frequent contact is tested first: the discriminant of all contacts is computed from two bytes. With a constant contact, the compiler leaves
-        // out the other contacts where the force is computed.
-        if matches!(contact, Contact::Grasp) {
+        // The most frequent contact is tested first, by a flag of its own: a comparison of the contact would become a part of the choice below, and the
+        // discriminant of all contacts is computed from two bytes. With a constant contact, the compiler leaves out the other contacts.
+        if self.is_grasping {
             return core::array::from_fn(|axis| force(Contact::Grasp, axis));
         }
         match contact {

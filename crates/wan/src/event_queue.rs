@@ -506,12 +506,20 @@ impl<E: Event, S: Store<E>> Queue<E, S> {
         let packed = self.pack(entry);
         let place = slot(bucket);
         let events = &mut self.ring[place];
-        // The first event of a bucket marks its slot, and reuses the memory of an emptied bucket.
         if events.is_empty() {
-            self.occupied[place / 64] |= 1 << (place % 64);
-            if let Some(spare) = self.spare.pop() {
-                *events = spare;
-            }
+            return self.begin_bucket(place, packed);
+        }
+        events.push(packed);
+    }
+
+    /// Puts the first event into the bucket of the slot `place`: marks the slot, and reuses the memory of an emptied bucket. Not inlined, so that a push into a
+    /// bucket stays small.
+    #[inline(never)]
+    fn begin_bucket(&mut self, place: usize, packed: Packed) {
+        self.occupied[place / 64] |= 1 << (place % 64);
+        let events = &mut self.ring[place];
+        if let Some(spare) = self.spare.pop() {
+            *events = spare;
         }
         events.push(packed);
     }

@@ -12,6 +12,7 @@ mod remote;
 mod turning;
 mod watch;
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -266,7 +267,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             }
             // The next due tick moves on even if `send_when` keeps back this sample: the condition is evaluated at due ticks only.
             member.next_send += member.send_every;
-            let local_time = member.clock.local_time(member.tick);
+            let local_time = member.peer.local_time();
             if let Some(when) = &self.send_when {
                 let own = member.peer.object().state();
                 if !when.is_due(member.last_sent.as_ref(), local_time, own, self.horizon) {
@@ -317,8 +318,12 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         network.handle_timeout(now).expect("instants come in order");
         let mut receivers = Receivers { members, samples, remote, axes: *axes };
         // Nearly all events are simple arrivals. For these the network need not build a complete event.
-        while let Some(taken) = network.take_mere_arrival(|event| receivers.take(now, &event, observer, watch)) {
-            taken?;
+        let ended = network.take_mere_arrivals(|event| match receivers.take(now, &event, observer, watch) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(ended) => ControlFlow::Break(ended),
+        });
+        if let Some(ended) = ended {
+            return Err(ended);
         }
         // A driver with remote peers asks for awaited instants, which a poll without an event passes.
         if E::IS_EMPTY && !network.may_have_events(now) { Ok(()) } else { receivers.take_all(network, now, observer, watch) }
@@ -401,11 +406,8 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         }
         let mut sum = State::REST;
         for (member, latest) in self.members.iter_mut().zip(&mut self.latest) {
-            member.peer.compute_over(now, span);
-            // Taken before the motion: the latest position is that of the tick, as in the general loop.
-            *latest = member.peer.object().state().position;
+            *latest = member.peer.tick(now, span);
             member.tick += 1;
-            member.peer.advance(now, span);
             member.add_states(&mut sum);
         }
         // One test of a sum shows whether all states are finite. Only if the sum has overflowed, each state is tested.

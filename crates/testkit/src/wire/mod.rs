@@ -12,6 +12,7 @@ mod recording;
 mod train;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use cohaptic_units::Instant;
@@ -205,14 +206,14 @@ impl<A: HasFlow + Clone> Wire<A> {
     pub(crate) fn poll(&mut self) -> Option<Box<Parcel<A>>> {
         if !self.is_watched {
             // Nothing is watched, so a packet that can only arrive needs no full event. A full event costs more to make.
-            let arrived = self.network.take_mere_arrival(|event| {
+            let arrived = self.network.take_mere_arrivals(|event| {
                 let (path, at, mut parcel) = (event.path, event.at, event.payload);
                 let Arrival { packet, .. } = &mut parcel.arrival;
                 packet.path = path;
                 (parcel.arrival.at, parcel.arrival.marked, parcel.arrival.is_cut) = (at, false, false);
-                parcel
+                ControlFlow::Break(parcel)
             });
-            // The next event may be a loss or a copy. `take_mere_arrival` stops there, and only `poll_event` handles such events.
+            // The next event may be a loss or a copy. `take_mere_arrivals` stops there, and only `poll_event` handles such events.
             if arrived.is_some() || !self.network.may_have_events(self.now) {
                 return arrived;
             }

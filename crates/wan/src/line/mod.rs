@@ -112,6 +112,18 @@ impl<P, T: Clone> Line<P, T> {
         self.pipeline.offer(now, number, words)
     }
 
+    /// Like [`Line::offer`], for many links of which nearly all have a constant delay: everything else is a function of its own, so that a loop over the links
+    /// stays small.
+    #[inline(always)]
+    pub(crate) fn offer_without_draws(&mut self, now: Instant) -> Outcome {
+        if let Pipeline::Constant(..) = self.pipeline { self.offer(now, None) } else { self.offer_otherwise(now) }
+    }
+
+    #[inline(never)]
+    fn offer_otherwise(&mut self, now: Instant) -> Outcome {
+        self.offer(now, None)
+    }
+
     /// Counts a dropped packet.
     #[inline(never)]
     pub(crate) fn drop(&mut self, cause: DropCause) {

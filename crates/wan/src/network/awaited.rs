@@ -37,8 +37,8 @@ impl Awaited {
         Self { is_awaited, is_receiver_awaited, instants: BinaryHeap::new() }
     }
 
-    /// Notes the departure of a packet to node `to` from a line at `at`.
-    #[inline]
+    /// Notes the departure of a packet to node `to` from a line at `at`. Not inlined, because most networks await no receiver.
+    #[inline(never)]
     pub(super) fn schedule(&mut self, at: Instant, to: NodeId) {
         if self.is_awaited[to.index()] {
             self.instants.push(Reverse(at));

@@ -1,5 +1,7 @@
 //! Packets from one node to all its receivers.
 
+use core::ops::Range;
+
 use cohaptic_units::Instant;
 
 use super::Network;
@@ -8,6 +10,7 @@ use super::groups::Group;
 use super::id::{LinkId, NodeId, Path};
 use super::paths::Paths;
 use super::pending::{InNetwork, LineId, SizeAndMarks};
+use super::sendings::Open;
 use super::traffic::Traffic;
 use crate::line::Line;
 use crate::line::pipeline::Outcome;
@@ -15,6 +18,9 @@ use crate::packet::PacketInfo;
 
 /// Number of links to which a packet of a broadcast is offered before the arrivals are scheduled.
 const OFFERED_AT_ONCE: u16 = 8;
+
+/// Arrivals of the packets that are offered together, or [`Instant::ZERO`] for a link without a later arrival.
+type Arrivals = [Instant; OFFERED_AT_ONCE as usize];
 
 /// Links from one node to all nodes, in the order of receivers.
 type Row<P> = [Line<P, InNetwork<P>>];
@@ -115,25 +121,40 @@ fn link_to(first: LinkId, to: NodeId) -> LineId {
 /// packets arrive together, and are scheduled together.
 #[inline(never)]
 fn schedule_groups<P: Clone>(row: &mut Row<P>, first: LinkId, traffic: &mut Traffic<P>, sent: &Sent<'_, P>, begin: u16) -> Option<Unusual> {
-    let Sent { now, from, size, payload } = *sent;
-    let mut group: Option<Group<P>> = None;
+    let Sent { now, from, .. } = *sent;
+    // Arrival, number and receivers of the present group. The group is made when it is complete, so that the loop over links changes few values.
+    let (mut arrives, mut receivers) = ((Instant::ZERO, 0), begin..begin);
+    let mut unusual = None;
     for (line, to) in row[usize::from(begin)..].iter_mut().zip(begin..).filter(|(_, to)| *to != from.0) {
         // The number is taken before the offer, because the offer counts the packet.
         let sequence = line.offered();
-        match (line.offer(now, None), &mut group) {
-            (Outcome::Arrives(at), Some(group)) if at == group.at && sequence == group.sequence => group.end = to + 1,
-            (Outcome::Arrives(at), _) if at > now => {
-                let next = Group { at, offered: now, sequence, from, next: NodeId(to), end: to + 1, first, size, payload: payload.clone() };
-                group.replace(next).into_iter().for_each(|group| traffic.schedule_group(group));
+        match line.offer_without_draws(now) {
+            Outcome::Arrives(at) if at > now => {
+                // The first packet begins a group, because it arrives after the beginning of time.
+                if (at, sequence) != arrives {
+                    schedule_group(traffic, sent, first, arrives, &receivers);
+                    (arrives, receivers.start) = ((at, sequence), to);
+                }
+                receivers.end = to + 1;
             }
-            (outcome, _) => {
-                group.into_iter().for_each(|group| traffic.schedule_group(group));
-                return Some(Unusual { to: NodeId(to), sequence, outcome });
+            outcome @ (Outcome::Arrives(_) | Outcome::Dropped(_) | Outcome::Enters) => {
+                unusual = Some(Unusual { to: NodeId(to), sequence, outcome });
+                break;
             }
         }
     }
-    group.into_iter().for_each(|group| traffic.schedule_group(group));
-    None
+    schedule_group(traffic, sent, first, arrives, &receivers);
+    unusual
+}
+
+/// Schedules the packets to `receivers`, if there are any, which arrive at one instant and have one number.
+#[inline(never)]
+fn schedule_group<P: Clone>(traffic: &mut Traffic<P>, sent: &Sent<'_, P>, first: LinkId, (at, sequence): (Instant, u64), receivers: &Range<u16>) {
+    let Sent { now, from, size, payload } = *sent;
+    if !receivers.is_empty() {
+        let (next, end) = (NodeId(receivers.start), receivers.end);
+        traffic.schedule_group(Group { at, offered: now, sequence, from, next, end, first, size, payload: payload.clone() });
+    }
 }
 
 /// Like [`schedule_groups`], for links of which some draw random numbers, so that each packet arrives at an instant of its own.
@@ -143,19 +164,10 @@ fn schedule_each<P: Clone>(row: &mut Row<P>, first: LinkId, traffic: &mut Traffi
     let mut open = traffic.open(sent, first, row.get(usize::from(receiver))?.offered());
     let mut unusual = None;
     for lines in row[usize::from(begin)..].chunks_mut(usize::from(OFFERED_AT_ONCE)) {
-        let (arrivals, other) = offer_to_some(lines, sent, begin);
-        for ((line, at), to) in lines.iter().zip(&arrivals).zip((begin..).map(NodeId)).filter(|((_, at), _)| **at > sent.now) {
-            // The latest packet of the link was offered just now.
-            let sequence = line.offered() - 1;
-            // Numbers differ only if single packets are sent between broadcasts.
-            if sequence != open.sequence {
-                traffic.close(&open);
-                open = traffic.open(sent, first, sequence);
-            }
-            traffic.schedule_shared(*at, to, &mut open);
-        }
-        if other.is_some() {
-            unusual = other;
+        let mut arrivals = [Instant::ZERO; OFFERED_AT_ONCE as usize];
+        unusual = offer_to_some(lines, sent, begin, &mut arrivals);
+        schedule_arrivals(lines, &arrivals, begin, (sent, first), traffic, &mut open);
+        if unusual.is_some() {
             break;
         }
         begin += OFFERED_AT_ONCE;
@@ -164,28 +176,50 @@ fn schedule_each<P: Clone>(row: &mut Row<P>, first: LinkId, traffic: &mut Traffi
     unusual
 }
 
-/// Offers a packet to each of at most [`OFFERED_AT_ONCE`] links to the receivers from `begin` on, up to the first packet that does not arrive later. Returns the
-/// arrivals, indexed like the links, or [`Instant::ZERO`] for a link without a later arrival, and the packet that ended the offers.
+/// Schedules the arrivals that come later than the packet, indexed like the links to the receivers from `begin` on. Not inlined, so that the loops over offers
+/// and over arrivals have all registers each (`benches/peers`, rows of watched packets).
+#[inline(never)]
+fn schedule_arrivals<P: Clone>(
+    lines: &Row<P>,
+    arrivals: &Arrivals,
+    begin: u16,
+    (sent, first): (&Sent<'_, P>, LinkId),
+    traffic: &mut Traffic<P>,
+    open: &mut Open,
+) {
+    for ((line, at), to) in lines.iter().zip(arrivals).zip((begin..).map(NodeId)).filter(|((_, at), _)| **at > sent.now) {
+        // The latest packet of the link was offered just now.
+        let sequence = line.offered() - 1;
+        // Numbers differ only if single packets are sent between broadcasts.
+        if sequence != open.sequence {
+            traffic.close(open);
+            *open = traffic.open(sent, first, sequence);
+        }
+        traffic.schedule_shared(*at, to, open);
+    }
+}
+
+/// Offers a packet to each of at most [`OFFERED_AT_ONCE`] links to the receivers from `begin` on, up to the first packet that does not arrive later. Sets the
+/// later arrivals, indexed like the links, and returns the packet that ended the offers.
 ///
-/// Draws, offers and events are three loops, because one loop for all needs more registers than there are (`benches/peers`, rows of watched packets).
+/// Draws and offers are two loops, because one loop for both needs more registers than there are (`benches/peers`, rows of watched packets).
 #[inline(always)]
-fn offer_to_some<P: Clone>(lines: &mut Row<P>, sent: &Sent<'_, P>, begin: u16) -> ([Instant; OFFERED_AT_ONCE as usize], Option<Unusual>) {
+fn offer_to_some<P: Clone>(lines: &mut Row<P>, sent: &Sent<'_, P>, begin: u16, arrivals: &mut Arrivals) -> Option<Unusual> {
     // The draws do not depend on each other, so a processor can compute several at once. The link from the node to itself has words as well, so words and links
     // stay in step.
     let mut words = [[0; 2]; OFFERED_AT_ONCE as usize];
     for (words, line) in words.iter_mut().zip(&*lines) {
         *words = line.words();
     }
-    let mut arrivals = [Instant::ZERO; OFFERED_AT_ONCE as usize];
-    for (((line, words), arrival), to) in lines.iter_mut().zip(&words).zip(&mut arrivals).zip((begin..).map(NodeId)) {
+    for (((line, words), arrival), to) in lines.iter_mut().zip(&words).zip(arrivals).zip((begin..).map(NodeId)) {
         if to == sent.from {
             continue;
         }
         let sequence = line.offered();
         match line.offer(sent.now, Some(*words)) {
             Outcome::Arrives(at) if at > sent.now => *arrival = at,
-            outcome @ (Outcome::Arrives(_) | Outcome::Dropped(_) | Outcome::Enters) => return (arrivals, Some(Unusual { to, sequence, outcome })),
+            outcome @ (Outcome::Arrives(_) | Outcome::Dropped(_) | Outcome::Enters) => return Some(Unusual { to, sequence, outcome }),
         }
     }
-    (arrivals, None)
+    None
 }

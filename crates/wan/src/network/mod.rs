@@ -31,6 +31,7 @@ mod traffic;
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
+use core::ops::ControlFlow;
 
 use cohaptic_units::Instant;
 
@@ -421,25 +422,31 @@ impl<P: Clone> Network<P> {
         None
     }
 
-    /// Polls like [`Network::poll_event`], but only if the next event is an arrival in a network of direct links. `take` is given the event, and its result is
-    /// returned. `None` says nothing about further events: call [`Network::poll_event`] then. The call is inlined, so unused parts of the event need not be
-    /// computed.
+    /// Polls like [`Network::poll_event`] as long as the next event is an arrival in a network of direct links, and gives each event to `take`. Ends after the
+    /// first break of `take`, and returns its value. `None` says nothing about further events: call [`Network::poll_event`] then. The call is inlined, so unused
+    /// parts of an event need not be computed.
     #[inline(always)]
-    pub fn take_mere_arrival<T>(&mut self, take: impl FnOnce(PacketEvent<P, Path>) -> T) -> Option<T> {
+    pub fn take_mere_arrivals<T>(&mut self, mut take: impl FnMut(PacketEvent<P, Path>) -> ControlFlow<T>) -> Option<T> {
         if self.has_inner_events || !self.traffic.happened.is_empty() {
             return None;
         }
         let Self { now, traffic, lines, .. } = self;
-        // Without inner events, no engine is woken, no packet has passed another line before its link, and no packet is damaged.
-        let Pending { at, sequence, offered, entered, turn, path, size, payload } = traffic.pop_due(*now)?;
-        let line = lines.link_mut(turn.link());
-        if size.has(SizeAndMarks::TRAIN) {
-            line.deliver_further(size.further_packets(), entered, at);
+        // An arrival drops no packet, so one instant holds for all arrivals.
+        let until = traffic.until(*now);
+        while let Some(pending) = traffic.pop_until(until) {
+            // Without inner events, no engine is woken, no packet has passed another line before its link, and no packet is damaged.
+            let Pending { at, sequence, offered, entered, turn, path, size, payload } = pending;
+            let line = lines.link_mut(turn.link());
+            if size.has(SizeAndMarks::TRAIN) {
+                line.deliver_further(size.further_packets(), entered, at);
+            }
+            line.deliver(entered, at);
+            let packet = InNetwork { sequence, offered, entered, path, size, payload: payload? };
+            if let ControlFlow::Break(value) = take(packet.event(LineId::Link(turn.link()), at, Fate::Delivered(at), None)) {
+                return Some(value);
+            }
         }
-        line.deliver(entered, at);
-        payload.map(|payload| {
-            take(InNetwork { sequence, offered, entered, path, size, payload }.event(LineId::Link(turn.link()), at, Fate::Delivered(at), None))
-        })
+        None
     }
 
     /// Changes the model of a link from `now` on: see [`crate::Link::set_model`].

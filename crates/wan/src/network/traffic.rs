@@ -63,11 +63,22 @@ impl<P: Clone> Traffic<P> {
     /// Removes and returns the first event if its instant is at most `now`, and at most the instant of the first packet in `dropped`.
     #[inline(always)]
     pub(super) fn pop_due(&mut self, now: Instant) -> Option<Pending<P>> {
-        let now = now.min(self.first_dropped);
-        match self.groups.due_key(now) {
+        self.pop_until(self.until(now))
+    }
+
+    /// Returns the latest instant of events that come before the first packet in `dropped`, at most `now`.
+    #[inline(always)]
+    pub(super) fn until(&self, now: Instant) -> Instant {
+        now.min(self.first_dropped)
+    }
+
+    /// Removes and returns the first event if its instant is at most `until`, an instant from [`Traffic::until`].
+    #[inline(always)]
+    pub(super) fn pop_until(&mut self, until: Instant) -> Option<Pending<P>> {
+        match self.groups.due_key(until) {
             // In most networks with groups the queue is empty.
-            Some(key) if self.pending.len() == 0 || self.pending.due_key(now).is_none_or(|other| key < other) => self.groups.take(),
-            Some(_) | None => self.pending.take_due(now, |pending| pending),
+            Some(key) if self.pending.len() == 0 || self.pending.due_key(until).is_none_or(|other| key < other) => self.groups.take(),
+            Some(_) | None => self.pending.take_due(until, |pending| pending),
         }
     }
 

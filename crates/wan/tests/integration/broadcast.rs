@@ -1,5 +1,6 @@
 //! A packet to all receivers, against one packet to each receiver: all events are equal and in the same order. The filter drops nothing, and changes nothing.
 
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 use cohaptic_tests_common::properties;
@@ -128,7 +129,7 @@ properties! {
                         network.handle_timeout(now).unwrap();
                     }
                     for _ in 0..most {
-                        let found = subject.take_mere_arrival(|event| event).or_else(|| subject.poll_event());
+                        let found = subject.take_mere_arrivals(ControlFlow::Break).or_else(|| subject.poll_event());
                         prop_assert_eq!(&found, &single.poll_event());
                         if found.is_none() {
                             break;

@@ -1,5 +1,6 @@
 //! Networks whose driver asks for arrivals alone, and not for other events, or asks late.
 
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 use cohaptic_tests_common::properties;
@@ -41,7 +42,7 @@ properties! {
             }
             let mut found = Vec::new();
             loop {
-                while let Some(event) = subject.take_mere_arrival(|event| event) {
+                while let Some(event) = subject.take_mere_arrivals(ControlFlow::Break) {
                     found.push(event);
                 }
                 let Some(event) = subject.poll_event() else { break };

@@ -1,5 +1,6 @@
 //! Trains: packets that are handed in together and travel as one event.
 
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 use cohaptic_tests_common::properties;
@@ -36,7 +37,7 @@ fn poll(network: &mut Network<Payload>, now: Instant) -> Vec<PacketRecord<Path>>
     network.handle_timeout(now).unwrap();
     let mut found = Vec::new();
     loop {
-        while let Some(event) = network.take_mere_arrival(|event| event) {
+        while let Some(event) = network.take_mere_arrivals(ControlFlow::Break) {
             found.extend(packets(event));
         }
         let Some(event) = network.poll_event() else { return found };
