@@ -16,6 +16,10 @@ pub(super) fn run(scene: &Scene, model: Model) -> Summary {
 
 /// What two runs differ in, first of all; `PartialEq` would let a zero pass for another one.
 pub(super) fn difference(one: &Summary, other: &Summary) -> Option<String> {
+    // The form on one line has the same values, and is written in a tenth of the time: summaries of many peers have a hundred thousand counters.
+    if format!("{one:?}") == format!("{other:?}") {
+        return None;
+    }
     let (one, other) = (format!("{one:#?}"), format!("{other:#?}"));
     let (line, (found, expected)) = one.lines().zip(other.lines()).enumerate().find(|(_, (a, b))| a != b)?;
     Some(format!("line {line}: {found} is not {expected}"))
