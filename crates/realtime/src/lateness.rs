@@ -62,23 +62,17 @@ impl Lateness {
         self.nanos.len() - self.nanos.count_between(0, limit)
     }
 
-    /// Returns the lateness that the share `share` of all values, from 0 to 1, does not exceed; zero if nothing was recorded.
-    #[must_use]
-    pub(crate) fn quantile(&self, share: f64) -> Duration {
-        Duration::from_nanos(self.nanos.value_at_quantile(share))
-    }
-
     /// Returns count, sum, maximum and the usual quantiles.
     #[must_use]
     pub fn summary(&self) -> LatenessSummary {
-        LatenessSummary {
-            count: self.count(),
-            sum: self.sum,
-            p50: self.quantile(0.5),
-            p99: self.quantile(0.99),
-            p999: self.quantile(0.999),
-            max: Duration::from_nanos(self.nanos.max()),
+        // A search for a quantile of nothing passes over all 24,000 counts, and a router has a distribution for each of its lanes.
+        if self.nanos.is_empty() {
+            return LatenessSummary::default();
         }
+        // One pass over the counts for the three quantiles.
+        let mut quantiles = self.nanos.value_at_quantiles([0.5, 0.99, 0.999]).map(Duration::from_nanos);
+        let [p50, p99, p999] = core::array::from_fn(|_| quantiles.next().unwrap_or_default());
+        LatenessSummary { count: self.count(), sum: self.sum, p50, p99, p999, max: Duration::from_nanos(self.nanos.max()) }
     }
 
     /// Returns each distinct value, to three digits, with its count, in increasing order.
@@ -202,7 +196,7 @@ mod tests {
         twice.merge(&lateness);
         assert_eq!((lateness.count(), twice.count()), (2, 4));
         assert_eq!(twice.count_later_than(Duration::from_secs(3000)), 2);
-        assert_eq!(twice.quantile(0.25), Duration::ZERO);
+        assert_eq!(twice.summary().p50, Duration::ZERO);
     }
 
     #[test]
