@@ -5,7 +5,7 @@ use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::pin::pin;
 use std::sync::Arc;
-use std::task::{Context, Waker};
+use std::task::{Context, Wake, Waker};
 use std::time::Duration;
 
 use cohaptic_testkit::hit::Verdict;
@@ -216,6 +216,32 @@ fn what_another_thread_drops_is_let_go_when_the_task_waits() {
             bed.host("b").listen("0.0.0.0:80").unwrap();
             accepted.readable().await.unwrap();
             assert_eq!(accepted.try_read(&mut [0; 1]).unwrap(), 0);
+        });
+    }
+}
+
+/// Waker that owns a socket, as the waker of an executor inside of a task owns what waits there.
+struct Owner(#[expect(dead_code, reason = "it is only dropped")] UdpSocket);
+
+impl Wake for Owner {
+    fn wake(self: Arc<Self>) {}
+}
+
+#[test]
+fn a_socket_that_the_state_drops_with_a_waker_is_let_go_when_the_task_waits() {
+    for bed in beds() {
+        bed.run(|bed| async move {
+            let (a, b) = (bed.host("a").bind("0.0.0.0:7").unwrap(), bed.host("b").bind("0.0.0.0:7").unwrap());
+            let owner = Waker::from(Arc::new(Owner(bed.host("b").bind("0.0.0.0:8").unwrap())));
+            assert!(pin!(b.recv(&mut [0; 1])).poll(&mut Context::from_waker(&owner)).is_pending());
+            drop(owner);
+            bed.host("b").bind("0.0.0.0:8").unwrap_err();
+            a.send_to(b"x", "b:7").await.unwrap();
+            assert_eq!(b.recv(&mut [0; 1]).await.unwrap(), 1);
+            // The state may keep the waker until another one takes its place.
+            assert!(pin!(b.recv(&mut [0; 1])).poll(&mut Context::from_waker(Waker::noop())).is_pending());
+            time::yield_now().await;
+            bed.host("b").bind("0.0.0.0:8").unwrap();
         });
     }
 }
