@@ -112,8 +112,17 @@ pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, 
         Some(node) => values::list(node, *context, "entries [[peers]]")?,
         None => Vec::new(),
     };
+    // Entries with a name alone have the keys of `[peer]`, which are read for the first of these entries. After a fault, each entry is read and reports it.
+    let mut unchanged: Option<PeerKeys> = None;
+    let read = |entry: &&Node| {
+        if entry.as_table().is_none_or(|table| table.0.len() != 1 || table.get("name").is_none()) {
+            return read_entry(entry, base, sources.update, context);
+        }
+        unchanged = unchanged.take().or_else(|| read_entry(entry, base, sources.update, context));
+        unchanged.clone()
+    };
     // Every entry is read before the first `?`, so that the faults of all entries are reported.
-    let own: Vec<Option<PeerKeys>> = entries.iter().map(|entry| read_entry(entry, base, sources.update, context)).collect();
+    let own: Vec<Option<PeerKeys>> = entries.iter().map(read).collect();
     let names = context.names?;
     // Keys of a peer without an entry. Read only if there is such a peer, because defaults alone need not be complete.
     let shared = if entries.len() < names.len() { Some(read_peer(base, context, &PEER, sources.update)?) } else { None };
