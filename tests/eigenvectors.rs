@@ -22,8 +22,9 @@ fn left_eigenvector(matrix: &Matrix, near: Complex64, place: usize) -> LeftEigen
     // Beside the eigenvalue by rounding, so that the system is never singular.
     let shift = near + f64::EPSILON * matrix.frobenius_norm();
     let mut w: Vec<Complex64> = (0..size).map(|row| Complex64::from(libm::sin(count((row + 1) * (place + 3))) + 1.5)).collect();
+    let eliminated = Eliminated::new(matrix, shift);
     for _ in 0..3 {
-        w = solved(matrix, shift, w);
+        w = eliminated.solved(&w);
         let length = w.iter().map(Complex64::norm_sqr).sum::<f64>().sqrt();
         w.iter_mut().for_each(|entry| *entry /= length);
     }
@@ -34,27 +35,46 @@ fn left_eigenvector(matrix: &Matrix, near: Complex64, place: usize) -> LeftEigen
     LeftEigenvector { value, entries: w, residual }
 }
 
-/// x with x·(A − λ) = b, by elimination with the largest pivot of each column.
-fn solved(matrix: &Matrix, value: Complex64, mut right: Vec<Complex64>) -> Vec<Complex64> {
-    let size = matrix.rows();
-    let entry = |row: usize, column: usize| matrix[(column, row)] - if row == column { value } else { Complex64::ZERO };
-    let mut rows: Vec<Vec<Complex64>> = (0..size).map(|row| (0..size).map(|column| entry(row, column)).collect()).collect();
-    for pivot in 0..size {
-        let larger = |largest: usize, row: usize| if rows[row][pivot].norm() > rows[largest][pivot].norm() { row } else { largest };
-        let largest = (pivot..size).fold(pivot, larger);
-        rows.swap(pivot, largest);
-        right.swap(pivot, largest);
-        let (above, below) = rows.split_at_mut(pivot + 1);
-        let (above, of_right) = (&above[pivot], right[pivot]);
-        for (row, right) in below.iter_mut().zip(&mut right[pivot + 1..]) {
-            let factor = row[pivot] / above[pivot];
-            row.iter_mut().zip(above).for_each(|(entry, above)| *entry -= factor * above);
-            *right -= factor * of_right;
+/// (A − λ)ᵀ after elimination with the largest pivot of each column, for any number of right sides.
+struct Eliminated {
+    /// Pivots and the entries right of them. Left of its pivot, a row has the factors by which the rows above were taken off.
+    rows: Vec<Vec<Complex64>>,
+    /// Row of the matrix that each row was.
+    order: Vec<usize>,
+}
+
+impl Eliminated {
+    fn new(matrix: &Matrix, value: Complex64) -> Self {
+        let size = matrix.rows();
+        let entry = |row: usize, column: usize| matrix[(column, row)] - if row == column { value } else { Complex64::ZERO };
+        let mut rows: Vec<Vec<Complex64>> = (0..size).map(|row| (0..size).map(|column| entry(row, column)).collect()).collect();
+        let mut order: Vec<usize> = (0..size).collect();
+        for pivot in 0..size {
+            let larger = |largest: usize, row: usize| if rows[row][pivot].norm() > rows[largest][pivot].norm() { row } else { largest };
+            let largest = (pivot..size).fold(pivot, larger);
+            rows.swap(pivot, largest);
+            order.swap(pivot, largest);
+            let (above, below) = rows.split_at_mut(pivot + 1);
+            let above = &above[pivot];
+            for row in below {
+                let factor = row[pivot] / above[pivot];
+                row[pivot + 1..].iter_mut().zip(&above[pivot + 1..]).for_each(|(entry, above)| *entry -= factor * above);
+                row[pivot] = factor;
+            }
         }
+        Self { rows, order }
     }
-    for row in (0..size).rev() {
-        let known: Complex64 = (row + 1..size).map(|column| rows[row][column] * right[column]).sum();
-        right[row] = (right[row] - known) / rows[row][row];
+
+    /// x with x·(A − λ) = b.
+    fn solved(&self, right: &[Complex64]) -> Vec<Complex64> {
+        let mut x: Vec<Complex64> = self.order.iter().map(|&row| right[row]).collect();
+        for (row, entries) in self.rows.iter().enumerate() {
+            x[row] = (0..row).fold(x[row], |rest, column| rest - entries[column] * x[column]);
+        }
+        for (row, entries) in self.rows.iter().enumerate().rev() {
+            let known: Complex64 = (row + 1..x.len()).map(|column| entries[column] * x[column]).sum();
+            x[row] = (x[row] - known) / entries[row];
+        }
+        x
     }
-    right
 }
