@@ -80,6 +80,14 @@ impl Schedule {
         }
     }
 
+    /// Lets all peers tick a period after `now`, and returns the period \[ns\] and as a span, if the peers tick in lockstep.
+    #[inline(always)]
+    pub(crate) fn tick_together(&mut self, now: Instant) -> Option<(u64, Duration)> {
+        let Self::Lockstep { nanos, span, next } = self else { return None };
+        *next = now.saturating_add_nanos(*nanos);
+        Some((*nanos, *span))
+    }
+
     pub(crate) fn tick_again(&mut self, peer: usize, at: Option<Instant>) {
         // In lockstep all peers share one next instant, so a single peer changes nothing.
         if let (Self::EventDriven(queue), Some(at)) = (self, at) {

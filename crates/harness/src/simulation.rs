@@ -182,9 +182,11 @@ fn run_to_end<const A: usize, S: Strategy<A>>(
 ) -> Result<Summary, Ended> {
     let watch = Watch::of(observer);
     loop {
-        for _ in 0..between_questions {
-            if let Step::Ended(ending) = world.step(observer, watch)? {
-                return Ok(world.summary(ending));
+        let mut instants = between_questions;
+        while instants > 0 {
+            match world.step(instants, observer, watch)? {
+                Step::Ticked(computed) => instants -= computed,
+                Step::Ended(ending) => return Ok(world.summary(ending)),
             }
         }
         // The latest step is complete, so the summary is consistent.

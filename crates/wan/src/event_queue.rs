@@ -288,14 +288,14 @@ impl<E: Event, S: Store<E>> Queue<E, S> {
         }
     }
 
-    /// Returns whether an event may be due at `now`, without a search. `false` is certain. After `true`, no event need be due.
+    /// Returns an instant before which no event is due, without a search. An event need not be due at the instant. [`Instant::MAX`] for an empty queue.
     #[inline(always)]
-    pub(crate) fn may_be_due(&self, now: Instant) -> bool {
+    pub(crate) fn quiet_until(&self) -> Instant {
         if self.in_order {
-            return self.ordered.front().is_some_and(|first| first.at() <= now);
+            return self.ordered.front().map_or(Instant::MAX, Event::at);
         }
         // Events in `ring` and `far` come after every event of the front, so the front decides unless it is empty.
-        self.front.first().map_or(self.quiet_until <= now && self.len > 0, |first| first.0 <= now)
+        self.front.first().map_or(if self.len > 0 { self.quiet_until } else { Instant::MAX }, |first| first.0)
     }
 
     /// Returns the instant of the first event, or `None` for an empty queue.

@@ -106,6 +106,18 @@ impl<T> Ring<T> {
         value
     }
 
+    /// Adds a value before the first value.
+    pub(crate) fn push_front(&mut self, value: T) {
+        if self.len == self.places.len() {
+            self.grow();
+        }
+        self.first = self.first.wrapping_sub(1) & (self.places.len() - 1);
+        // The only value is also the last value.
+        self.last = if self.len == 0 { self.first } else { self.last };
+        self.places[self.first] = Some(value);
+        self.len += 1;
+    }
+
     /// Drops the first value in its place. Does nothing on an empty ring.
     #[inline(always)]
     pub(crate) fn drop_front(&mut self) {
@@ -154,7 +166,7 @@ mod tests {
     properties! {
         /// A number below 6 is a value to push; each of the other numbers stands for another operation.
         #[test]
-        fn it_does_what_a_deque_does(acts in prop::collection::vec(0_u8..10, 0..200)) {
+        fn it_does_what_a_deque_does(acts in prop::collection::vec(0_u8..11, 0..200)) {
             let (mut ring, mut deque) = (Ring::new(), VecDeque::new());
             for act in acts {
                 match act {
@@ -166,6 +178,10 @@ mod tests {
                     8 => {
                         ring.drop_front();
                         deque.pop_front();
+                    }
+                    9 => {
+                        ring.push_front(act);
+                        deque.push_front(act);
                     }
                     _ if deque.len() > 20 => {
                         ring.clear();

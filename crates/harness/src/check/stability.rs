@@ -97,8 +97,9 @@ fn follow<const A: usize>(
     let mut steps = 0_u64;
     let between_questions = u64::from(questions_of(scene));
     loop {
-        let Ok((one, other)) = Erased::run(&mut NoObserver, |observer| Ok((nominal.step(observer, nothing)?, disturbed.step(observer, nothing)?)));
-        if one == Step::Ticked && other == Step::Ticked {
+        let Ok((one, other)) =
+            Erased::run(&mut NoObserver, |observer| Ok((nominal.step(1, observer, nothing)?, disturbed.step(1, observer, nothing)?)));
+        if one == Step::Ticked(1) && other == Step::Ticked(1) {
             let size = relative_displacement(&nominal, &disturbed);
             // Only the second and the last quarter are compared: see `verdict`.
             match quarter(nominal.now()) {

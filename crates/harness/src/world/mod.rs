@@ -1,13 +1,15 @@
 //! A running scene in virtual time or in a session: peers, network and schedule, with A simulated axes.
 //!
-//! A [`World`] is made from a checked scene and a [`Plan`]. Each step computes one instant and shows rows to the observer; the summary is read at the end. No
-//! file, socket or clock of the machine is known here.
+//! A [`World`] is made from a checked scene and a [`Plan`]. Each step computes an instant, and the following instants with nothing but ticks, and shows rows to
+//! the observer; the summary is read at the end. No file, socket or clock of the machine is known here.
 
+mod bounds;
 mod changes;
 mod judging;
 pub(crate) mod live;
 mod member;
 mod operators;
+mod receivers;
 mod remote;
 mod turning;
 mod watch;
@@ -19,23 +21,25 @@ use std::time::Duration;
 use cohaptic_peer::coordination::Role;
 use cohaptic_peer::rotation::Attitude;
 use cohaptic_peer::wire::{Sample, SampleKind};
-use cohaptic_peer::{Contact, Device, LastSent, Peer, Reception, SendWhen, State, Strategy};
+use cohaptic_peer::{Contact, Device, LastSent, Peer, SendWhen, State, Strategy};
 use cohaptic_scene::{Change, Scene, Topology};
 use cohaptic_units::{Bytes, Ecn, Instant};
-use cohaptic_wan::{AccessLine, Fate, LinkModel, Network, NetworkConfig, NodeId, PacketEvent, PacketInfo, Path};
+use cohaptic_wan::{AccessLine, LinkModel, Network, NetworkConfig, NodeId, PacketInfo};
 
 use crate::disturbance::Disturbance;
 use crate::in_flight::{Handle, SamplesInFlight};
 use crate::observer::{Ended, Observer};
 use crate::plan::Plan;
-use crate::rows::{HoldRow, InstantRow, SendRow, StateRow, TickRow};
+use crate::rows::{InstantRow, SendRow, StateRow, TickRow};
 use crate::schedule::Schedule;
 use crate::summary::{AccessSummary, Ending, LinkSummaries, PeerSummary, Summary};
 
+use bounds::Bounds;
 use changes::{ParameterChange, parameter_changes};
 use judging::Judging;
 use member::{DeviceModel, Member};
 use operators::Operators;
+use receivers::Receivers;
 pub(crate) use remote::{Arriving, NoRemote, Remote};
 use turning::Turning;
 pub(crate) use watch::Watch;
@@ -105,7 +109,8 @@ pub(crate) struct Turns {
 /// Outcome of one step of a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Step {
-    Ticked,
+    /// Number of computed instants, at least 1.
+    Ticked(u32),
     Ended(Ending),
 }
 
@@ -165,8 +170,9 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         self.end
     }
 
-    /// Computes the next instant of a tick. Ends the run if the instant is not before the end of the scene, or if a number is not finite.
-    pub(crate) fn step(&mut self, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<Step, Ended> {
+    /// Computes the next instant of a tick, and the instants after it at which nothing but ticks happens, together at most `most` instants. Ends the run if the
+    /// instant is not before the end of the scene, or if a number is not finite.
+    pub(crate) fn step(&mut self, most: u32, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<Step, Ended> {
         let Some(now) = self.schedule.next_instant().filter(|now| *now < self.end) else {
             return self.finish(observer, watch).map(Step::Ended);
         };
@@ -190,14 +196,9 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         if let (Some(operators), Some(judging)) = (&mut self.operators, &self.judging) {
             operators.act(now, &self.ticking, &mut self.members, judging.judge());
         }
-        self.compute_and_move(now, observer, watch)?;
-        // `latest` holds the positions before the move, so the discrepancy belongs to `now`.
-        let discrepancy = self.measure_discrepancy();
-        if watch.instants {
-            observer.on_instant(&InstantRow { at: now, discrepancy })?;
-        }
+        let instants = self.compute_and_move(now, most, observer, watch)?;
         self.judge_instant();
-        Ok(Step::Ticked)
+        Ok(Step::Ticked(instants))
     }
 
     /// Judges the task after all ticks of an instant, and ends the run at the outcome if the task says so. The next step then finds the run at its end.
@@ -329,26 +330,28 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         if E::IS_EMPTY && !network.may_have_events(now) { Ok(()) } else { receivers.take_all(network, now, observer, watch) }
     }
 
-    /// Steps 3 and 4 of an instant: each ticking peer computes its forces and moves to its next tick.
-    fn compute_and_move(&mut self, now: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<(), Ended> {
+    /// Steps 3 and 4 of an instant: each ticking peer computes its forces and moves to its next tick. Goes on with the instants after `now` at which nothing else
+    /// happens, and returns the number of instants, at most `most`.
+    fn compute_and_move(
+        &mut self,
+        now: Instant,
+        most: u32,
+        observer: &mut (impl Observer<Error = Ended> + ?Sized),
+        watch: Watch,
+    ) -> Result<u32, Ended> {
         // In lockstep all ticks have the same length and no queue of ticks is needed.
-        let lockstep = match &mut self.schedule {
-            Schedule::Lockstep { nanos, span, next } => {
-                *next = now.saturating_add_nanos(*nanos);
-                Some(*span)
-            }
-            Schedule::EventDriven(_) => None,
-        };
-        let mut judging = self.judging.as_mut().filter(|judging| judging.takes_ticks());
-        let shows_ticks = watch.ticks || judging.is_some();
-        if let (Some(span), false, true) = (lockstep, shows_ticks || watch.steps, E::IS_EMPTY) {
-            self.move_together(now, span);
-            return Ok(());
+        let lockstep = self.schedule.tick_together(now);
+        let takes_ticks = self.judging.as_ref().is_some_and(|judging| judging.takes_ticks());
+        let shows_ticks = watch.ticks || takes_ticks;
+        if let (Some(lockstep), false, true) = (lockstep, shows_ticks || watch.steps, E::IS_EMPTY) {
+            return self.move_together(now, lockstep, most, observer, watch);
         }
+        let span_of_all = lockstep.map(|(_, span)| span);
+        let mut judging = self.judging.as_mut().filter(|_| takes_ticks);
         for &place in &self.ticking {
             let member = &mut self.members[place];
             self.remote.attend(now, place, &mut member.peer, self.axes, observer)?;
-            let span = lockstep.unwrap_or_else(|| {
+            let span = span_of_all.unwrap_or_else(|| {
                 let next = member.clock.instant(member.tick + 1);
                 self.schedule.tick_again(place, next);
                 next.unwrap_or(Instant::MAX) - now
@@ -393,53 +396,82 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             // Checked after the move: the next step ends the run before the number reaches a row.
             self.finite &= member.is_finite();
         }
-        Ok(())
+        let mut bounds = Bounds::NONE;
+        for (_, position) in self.latest.iter().enumerate().filter(|(place, _)| self.remote.is_there(*place)) {
+            bounds.add(position);
+        }
+        self.end_instant(now, &bounds, observer, watch)?;
+        Ok(1)
     }
 
-    /// Computes and moves all peers in one loop, for runs in lockstep without an observer of ticks or steps. The results equal those of the general loop.
-    #[inline]
-    fn move_together(&mut self, now: Instant, span: Duration) {
-        if let Some(turning) = &mut self.turning {
-            for (latest, rotation) in turning.latest.iter_mut().zip(self.members.iter().filter_map(|member| member.peer.rotation())) {
-                *latest = *rotation.copy();
+    /// Computes and moves all peers in one loop, for runs in lockstep without an observer of ticks or steps. The results equal those of the general loop. Goes
+    /// on with the next instants as long as nothing but ticks happens, and returns the number of instants, at most `most`.
+    fn move_together(
+        &mut self,
+        mut now: Instant,
+        (nanos, span): (u64, Duration),
+        most: u32,
+        observer: &mut (impl Observer<Error = Ended> + ?Sized),
+        watch: Watch,
+    ) -> Result<u32, Ended> {
+        // Asked once: ticks send nothing, so nothing comes closer during them.
+        let (most, until) = self.quiet(most);
+        let mut instants = 1;
+        loop {
+            if let Some(turning) = &mut self.turning {
+                for (latest, rotation) in turning.latest.iter_mut().zip(self.members.iter().filter_map(|member| member.peer.rotation())) {
+                    *latest = *rotation.copy();
+                }
             }
+            let (mut sum, mut bounds) = (State::REST, Bounds::NONE);
+            for member in &mut self.members {
+                // The positions before the move, so the discrepancy belongs to `now`.
+                bounds.add(&member.peer.tick(now, span));
+                member.tick += 1;
+                member.add_states(&mut sum);
+            }
+            // One test of a sum shows whether all states are finite. Only if the sum has overflowed, each state is tested.
+            let are_finite = sum.is_finite() || self.members.iter().all(Member::is_finite);
+            self.finite &= are_finite && (self.turning.is_none() || self.members.iter().all(Member::turns_finitely));
+            self.end_instant(now, &bounds, observer, watch)?;
+            let next = now.saturating_add_nanos(nanos);
+            if instants >= most || next >= until || !self.finite {
+                self.now = now;
+                self.schedule.tick_together(now);
+                return Ok(instants);
+            }
+            (now, instants) = (next, instants + 1);
         }
-        let mut sum = State::REST;
-        for (member, latest) in self.members.iter_mut().zip(&mut self.latest) {
-            *latest = member.peer.tick(now, span);
-            member.tick += 1;
-            member.add_states(&mut sum);
-        }
-        // One test of a sum shows whether all states are finite. Only if the sum has overflowed, each state is tested.
-        let are_finite = sum.is_finite() || self.members.iter().all(Member::is_finite);
-        self.finite &= are_finite && (self.turning.is_none() || self.members.iter().all(Member::turns_finitely));
     }
 
-    /// Returns the largest distance along an axis between two copies at their latest ticks \[m\]. Copies of absent peers are left out.
+    /// Returns how long a run in lockstep has nothing but ticks after the present instant: the number of instants, at most `most` and with the present instant,
+    /// up to the next sample, and an instant before which no change of the timeline, no packet and no end of the run comes.
+    fn quiet(&self, most: u32) -> (u32, Instant) {
+        // A judge and modelled persons see each instant.
+        if self.judging.is_some() || self.operators.is_some() {
+            return (1, self.now);
+        }
+        let change = self.changes.last().map_or(self.end, |change| change.at);
+        let until = self.network.quiet_until().min(change).min(self.end);
+        let ticks = self.earliest_send - self.members[self.remote.lead()].tick;
+        (u32::try_from(ticks).unwrap_or(u32::MAX).min(most), until)
+    }
+
+    /// Ends the ticks of an instant, given the positions of all copies: measures their discrepancy, and shows the instant.
     #[inline(always)]
-    fn measure_discrepancy(&mut self) -> f64 {
-        let (mut low, mut high) = ([f64::INFINITY; A], [f64::NEG_INFINITY; A]);
-        for (place, position) in self.latest.iter().enumerate() {
-            if !self.remote.is_there(place) {
-                continue;
-            }
-            for axis in 0..A {
-                // Comparisons with NaN are false: an unknown position changes neither bound.
-                low[axis] = if position[axis] < low[axis] { position[axis] } else { low[axis] };
-                high[axis] = if position[axis] > high[axis] { position[axis] } else { high[axis] };
-            }
-        }
-        let mut discrepancy = 0.0_f64;
-        for axis in 0..A {
-            // A difference that is not a number changes nothing, as with `f64::max`, which takes more instructions.
-            let apart = high[axis] - low[axis];
-            discrepancy = if apart > discrepancy { apart } else { discrepancy };
-        }
+    fn end_instant(
+        &mut self,
+        now: Instant,
+        bounds: &Bounds<A>,
+        observer: &mut (impl Observer<Error = Ended> + ?Sized),
+        watch: Watch,
+    ) -> Result<(), Ended> {
+        let discrepancy = bounds.discrepancy();
         self.max_discrepancy = if discrepancy > self.max_discrepancy { discrepancy } else { self.max_discrepancy };
         if let Some(turning) = &mut self.turning {
             turning.measure(|place| self.remote.is_there(place));
         }
-        discrepancy
+        if watch.instants { observer.on_instant(&InstantRow { at: now, discrepancy }) } else { Ok(()) }
     }
 
     /// Ends the scene: applies the changes and delivers the packets due at the end.
@@ -519,70 +551,6 @@ fn store_extended<const A: usize, D: Device<A>, S: Strategy<A>>(
         }
         peer.all_sent();
     })
-}
-
-/// Receiving side of the world: the parts changed by a delivered packet, borrowed apart from the delivering network.
-struct Receivers<'a, const A: usize, S, E: Remote<A>> {
-    members: &'a mut [Member<A, S, E::Device>],
-    samples: &'a mut SamplesInFlight<A>,
-    remote: &'a mut E,
-    axes: usize,
-}
-
-impl<const A: usize, S: Strategy<A>, E: Remote<A>> Receivers<'_, A, S, E> {
-    /// Handles all events of packets that have happened by now. Not inlined, so that the loop over simple arrivals has the registers for itself
-    /// (`benches/peers`, rows of watched packets).
-    #[inline(never)]
-    fn take_all(
-        &mut self,
-        network: &mut Network<Handle>,
-        now: Instant,
-        observer: &mut (impl Observer<Error = Ended> + ?Sized),
-        watch: Watch,
-    ) -> Result<(), Ended> {
-        while let Some(event) = network.poll_event() {
-            self.take(now, &event, observer, watch)?;
-        }
-        Ok(())
-    }
-
-    /// Handles an event of a packet: hands over a delivered sample, releases the stored sample, shows the packet's record.
-    #[inline(always)]
-    fn take(
-        &mut self,
-        now: Instant,
-        event: &PacketEvent<Handle, Path>,
-        observer: &mut (impl Observer<Error = Ended> + ?Sized),
-        watch: Watch,
-    ) -> Result<(), Ended> {
-        if let Fate::Delivered(_) = event.fate {
-            let to = event.path.to.index();
-            let receiver = &mut self.members[to];
-            let sample = Arriving { samples: self.samples, handle: event.payload, to, axes: self.axes };
-            match self.remote.receive(now, event, &sample, &mut receiver.peer) {
-                Some(Ok(Reception::Newest)) if watch.holds => {
-                    observer.on_hold(&HoldRow { at: now, from: event.path.from.index(), to, sampled: event.offered })?;
-                }
-                // `None`: the datagram waits in the outbox of the remote peers.
-                // `Added`: a later sample is held already, so no hold begins.
-                None | Some(Ok(Reception::Newest | Reception::Added)) => {}
-                Some(Ok(Reception::Stale)) => receiver.stale_samples += 1,
-                Some(Err(_)) if event.damage.is_some() => receiver.refused_samples += 1,
-                Some(Err(error)) => unreachable!("peers of one scene understand each other: {error}"),
-            }
-        }
-        // The store counts the packets of a sample: a copy adds a packet, every other event removes a packet.
-        if event.fate == Fate::Duplicated {
-            self.samples.retain(event.payload);
-        } else {
-            self.samples.release(event.payload);
-        }
-        // `Fate::Duplicated` is not an end: the packet and its copy each get a later record.
-        if watch.packets && event.fate.is_end() {
-            observer.on_packet(&event.record)?;
-        }
-        Ok(())
-    }
 }
 
 fn row<const A: usize>(state: &State<A>, axes: usize) -> StateRow<'_> {

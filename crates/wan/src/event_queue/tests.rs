@@ -27,10 +27,10 @@ fn simultaneous_events_come_in_order_of_their_keys() {
     assert_eq!(order, [0, 1, 2, 3]);
 }
 
-/// For events in the ring, in buckets and beyond the buckets: `may_be_due` is true if an event is due, and false after a search at the same instant that
-/// found no event.
+/// For events in the ring, in buckets and beyond the buckets: `quiet_until` is not after an event, and is later than an instant at which a search has found no
+/// event.
 #[test]
-fn what_is_due_may_be_due() {
+fn no_event_is_due_in_a_quiet_time() {
     let (mut queue, mut pending, mut number) = (Queue::new(Slab::new()), alloc::collections::BTreeSet::new(), 2015_u64);
     let mut draw = |below: u64| {
         number = number.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -46,13 +46,13 @@ fn what_is_due_may_be_due() {
         }
         now += draw(2) * draw(2_000_000);
         let (at, first) = (Instant::from_nanos(now), pending.first().copied().filter(|first: &Note| first.0 <= now));
-        assert!(first.is_none() || queue.may_be_due(at), "{first:?} is due at {now}");
-        quiet += usize::from(first.is_none() && !pending.is_empty() && !queue.may_be_due(at));
+        assert!(first.is_none() || queue.quiet_until() <= at, "{first:?} is due at {now}");
+        quiet += usize::from(first.is_none() && !pending.is_empty() && queue.quiet_until() > at);
         assert_eq!(queue.take_due(at, |note| note), first);
         if let Some(first) = first {
             pending.remove(&first);
         } else {
-            assert!(!queue.may_be_due(at), "what was searched in vain at {now} is searched again");
+            assert!(queue.quiet_until() > at, "what was searched in vain at {now} is searched again");
         }
     }
     assert!(quiet > 1000, "only {quiet} instants were known to be quiet");

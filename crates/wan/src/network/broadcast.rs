@@ -132,7 +132,9 @@ fn schedule_groups<P: Clone>(row: &mut Row<P>, first: LinkId, traffic: &mut Traf
             Outcome::Arrives(at) if at > now => {
                 // The first packet begins a group, because it arrives after the beginning of time.
                 if (at, sequence) != arrives {
-                    schedule_group(traffic, sent, first, arrives, &receivers);
+                    if !receivers.is_empty() {
+                        schedule_group(traffic, sent, first, arrives, &receivers);
+                    }
                     (arrives, receivers.start) = ((at, sequence), to);
                 }
                 receivers.end = to + 1;
@@ -143,18 +145,18 @@ fn schedule_groups<P: Clone>(row: &mut Row<P>, first: LinkId, traffic: &mut Traf
             }
         }
     }
-    schedule_group(traffic, sent, first, arrives, &receivers);
+    if !receivers.is_empty() {
+        schedule_group(traffic, sent, first, arrives, &receivers);
+    }
     unusual
 }
 
-/// Schedules the packets to `receivers`, if there are any, which arrive at one instant and have one number.
+/// Schedules the packets to `receivers`, which arrive at one instant and have one number.
 #[inline(never)]
 fn schedule_group<P: Clone>(traffic: &mut Traffic<P>, sent: &Sent<'_, P>, first: LinkId, (at, sequence): (Instant, u64), receivers: &Range<u16>) {
     let Sent { now, from, size, payload } = *sent;
-    if !receivers.is_empty() {
-        let (next, end) = (NodeId(receivers.start), receivers.end);
-        traffic.schedule_group(Group { at, offered: now, sequence, from, next, end, first, size, payload: payload.clone() });
-    }
+    let (next, end) = (NodeId(receivers.start), receivers.end);
+    traffic.schedule_group(Group { at, offered: now, sequence, from, next, end, first, size, payload: payload.clone() });
 }
 
 /// Like [`schedule_groups`], for links of which some draw random numbers, so that each packet arrives at an instant of its own.

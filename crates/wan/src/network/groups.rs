@@ -11,7 +11,7 @@ use super::pending::{InNetwork, LineId, Pending, SizeAndMarks, Turn};
 use crate::event_queue::Event;
 use crate::ring::Ring;
 
-/// Packets from one node that left their links at the same instant with the same number.
+/// Packets from one node that leave their links at the same instant with the same number.
 #[derive(Clone, Debug)]
 pub(super) struct Group<P> {
     pub(super) at: Instant,
@@ -23,7 +23,7 @@ pub(super) struct Group<P> {
     pub(super) next: NodeId,
     /// First node after the receivers. The sender is no receiver.
     pub(super) end: u16,
-    /// First link of the sender: the link to node 0, if there were one.
+    /// First link of the sender: the link to node 0, if there were one. Numbers of links wrap around, because a single packet may be on any link.
     pub(super) first: LinkId,
     pub(super) size: SizeAndMarks,
     pub(super) payload: P,
@@ -39,8 +39,16 @@ impl<P: Clone> Group<P> {
         self.next.0 + 1 >= self.end
     }
 
+    /// Returns the packet of an event on a link that is not a wake.
+    #[inline(always)]
+    pub(super) fn single(event: Pending<P>) -> Option<Self> {
+        let Pending { at, sequence, offered, turn, path: Path { from, to }, size, payload, .. } = event;
+        let first = LinkId(turn.link().0.wrapping_sub(to.0.into()));
+        Some(Self { at, offered, sequence, from, next: to, end: to.0 + 1, first, size, payload: payload? })
+    }
+
     const fn line(&self, to: u16) -> LineId {
-        LineId::Link(LinkId(self.first.0 + to as u32))
+        LineId::Link(self.first.to_receiver(to))
     }
 
     const fn path(&self) -> Path {
@@ -89,6 +97,17 @@ impl<P: Clone> Groups<P> {
     pub(super) fn due_key(&self, now: Instant) -> Option<<Pending<P> as Event>::Key> {
         let group = self.0.front().filter(|group| group.at <= now)?;
         Some((group.at, Turn::arrival(group.line(group.next.0)), group.sequence, group.path(), group.size.copy()))
+    }
+
+    /// Removes and returns the first group.
+    #[inline(always)]
+    pub(super) fn take_group(&mut self) -> Option<Group<P>> {
+        self.0.pop()
+    }
+
+    /// Puts the rest of a group back, which was the first group.
+    pub(super) fn put_back(&mut self, group: Group<P>) {
+        self.0.push_front(group);
     }
 
     /// Removes and returns the next packet.

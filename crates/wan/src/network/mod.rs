@@ -37,11 +37,12 @@ use cohaptic_units::Instant;
 
 use awaited::Awaited;
 pub use config::{AccessLine, NetworkConfig, NetworkError};
+use groups::Group;
 use id::{LinkId, NodeId, Path};
 use lines::Lines;
 use on_demand::OnDemand;
 use paths::Paths;
-use pending::{InNetwork, LineId, Pending, SizeAndMarks};
+use pending::{InNetwork, LineId, SizeAndMarks};
 use traffic::Traffic;
 
 use crate::fates::fate::Fate;
@@ -378,7 +379,16 @@ impl<P: Clone> Network<P> {
     #[must_use]
     #[inline(always)]
     pub fn may_have_events(&self, now: Instant) -> bool {
-        !self.traffic.happened.is_empty() || self.traffic.may_be_due(now)
+        self.quiet_until() <= now
+    }
+
+    /// Returns an instant before which no event happens, as long as nothing is handed in and all events that have happened are polled: a driver can wait until
+    /// then. No event need happen at the instant. Unlike [`Network::poll_timeout`] the method does not search. An event that waits to be polled gives
+    /// [`Instant::ZERO`], and no packet on the way gives [`Instant::MAX`].
+    #[must_use]
+    #[inline(always)]
+    pub fn quiet_until(&self) -> Instant {
+        self.traffic.quiet_until()
     }
 
     /// Returns the instant of the next call of [`Network::handle_timeout`] necessary for a packet to reach one of the receivers of [`Network::awaiting`] in
@@ -433,17 +443,35 @@ impl<P: Clone> Network<P> {
         let Self { now, traffic, lines, .. } = self;
         // An arrival drops no packet, so one instant holds for all arrivals.
         let until = traffic.until(*now);
-        while let Some(pending) = traffic.pop_until(until) {
+        while let Some(group) = traffic.pop_arrivals(until) {
             // Without inner events, no engine is woken, no packet has passed another line before its link, and no packet is damaged.
-            let Pending { at, sequence, offered, entered, turn, path, size, payload } = pending;
-            let line = lines.link_mut(turn.link());
-            if size.has(SizeAndMarks::TRAIN) {
-                line.deliver_further(size.further_packets(), entered, at);
-            }
-            line.deliver(entered, at);
-            let packet = InNetwork { sequence, offered, entered, path, size, payload: payload? };
-            if let ControlFlow::Break(value) = take(packet.event(LineId::Link(turn.link()), at, Fate::Delivered(at), None)) {
-                return Some(value);
+            let is_single = group.is_single();
+            let Group { at, offered, sequence, from, next: NodeId(mut to), end, first, size, payload } = group;
+            let mut payload = Some(payload);
+            loop {
+                let link = first.to_receiver(to);
+                let line = lines.link_mut(link);
+                if size.has(SizeAndMarks::TRAIN) {
+                    line.deliver_further(size.further_packets(), offered, at);
+                }
+                line.deliver(offered, at);
+                let own = payload.take()?;
+                // A single packet has the payload itself: its payload is never copied.
+                if !is_single {
+                    payload = Some(own.clone());
+                }
+                let packet = InNetwork { sequence, offered, entered: offered, path: Path { from, to: NodeId(to) }, size, payload: own };
+                let ended = take(packet.event(LineId::Link(link), at, Fate::Delivered(at), None));
+                to = if to + 1 == from.0 { to + 2 } else { to + 1 };
+                if let ControlFlow::Break(value) = ended {
+                    if let Some(payload) = payload.filter(|_| to < end) {
+                        traffic.put_back(Group { at, offered, sequence, from, next: NodeId(to), end, first, size, payload });
+                    }
+                    return Some(value);
+                }
+                if to >= end {
+                    break;
+                }
             }
         }
         None

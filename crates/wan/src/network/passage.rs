@@ -33,7 +33,7 @@ impl<P: Clone> Network<P> {
     /// network.
     #[inline(always)]
     pub(super) fn settle(&mut self, now: Instant) {
-        if !self.has_inner_events && self.traffic.may_be_due(now) {
+        if !self.has_inner_events && self.traffic.quiet_until() <= now {
             self.settle_all(now);
         }
     }
@@ -112,7 +112,7 @@ impl<P: Clone> Network<P> {
         let (link, place) = self.link_and_place(path);
         // As if the packets of a broadcast were sent singly: an arrival of an earlier packet at `now` comes before the events of this packet. After `let_pass`,
         // because the link may just have been made, and may have switched the network to inner events.
-        if self.has_inner_events && self.traffic.may_be_due(now) {
+        if self.has_inner_events && self.traffic.quiet_until() <= now {
             self.let_happen(now);
         }
         let sequence = self.lines.links[place].offered();

@@ -54,16 +54,24 @@ impl<P: Clone> Traffic<P> {
         self.pending.next_at().into_iter().chain(self.groups.next_at()).min()
     }
 
-    /// Returns whether an event may be due at `now`, without a search. `false` is certain.
+    /// Returns an instant before which no event is due, without a search: see [`Queue::quiet_until`].
     #[inline(always)]
-    pub(super) fn may_be_due(&self, now: Instant) -> bool {
-        !self.dropped.is_empty() || self.groups.next_at().is_some_and(|at| at <= now) || self.pending.may_be_due(now)
+    pub(super) fn quiet_until(&self) -> Instant {
+        if !self.happened.is_empty() || !self.dropped.is_empty() {
+            return Instant::ZERO;
+        }
+        self.pending.quiet_until().min(self.groups.next_at().unwrap_or(Instant::MAX))
     }
 
     /// Removes and returns the first event if its instant is at most `now`, and at most the instant of the first packet in `dropped`.
     #[inline(always)]
     pub(super) fn pop_due(&mut self, now: Instant) -> Option<Pending<P>> {
-        self.pop_until(self.until(now))
+        let until = self.until(now);
+        match self.groups.due_key(until) {
+            // In most networks with groups the queue is empty.
+            Some(key) if self.pending.len() == 0 || self.pending.due_key(until).is_none_or(|other| key < other) => self.groups.take(),
+            Some(_) | None => self.pending.take_due(until, |pending| pending),
+        }
     }
 
     /// Returns the latest instant of events that come before the first packet in `dropped`, at most `now`.
@@ -72,14 +80,24 @@ impl<P: Clone> Traffic<P> {
         now.min(self.first_dropped)
     }
 
-    /// Removes and returns the first event if its instant is at most `until`, an instant from [`Traffic::until`].
+    /// Removes and returns the first packets in a network without inner events, if their instant is at most `until`, an instant from [`Traffic::until`]: a whole
+    /// group if no other event is due, and a single packet otherwise. The caller [puts back](Traffic::put_back) what it does not take of a group.
     #[inline(always)]
-    pub(super) fn pop_until(&mut self, until: Instant) -> Option<Pending<P>> {
-        match self.groups.due_key(until) {
-            // In most networks with groups the queue is empty.
-            Some(key) if self.pending.len() == 0 || self.pending.due_key(until).is_none_or(|other| key < other) => self.groups.take(),
-            Some(_) | None => self.pending.take_due(until, |pending| pending),
+    pub(super) fn pop_arrivals(&mut self, until: Instant) -> Option<Group<P>> {
+        let key = self.groups.due_key(until);
+        // In most networks with groups the queue is empty.
+        let other = if key.is_none() || self.pending.len() == 0 { None } else { self.pending.due_key(until) };
+        match (key, other) {
+            (Some(_), None) => self.groups.take_group(),
+            (Some(key), Some(other)) if key < other => self.groups.take().and_then(Group::single),
+            (Some(_) | None, Some(_) | None) => self.pending.take_due(until, Group::single)?,
         }
+    }
+
+    /// Puts back the rest of a group from [`Traffic::pop_arrivals`].
+    #[cold]
+    pub(super) fn put_back(&mut self, group: Group<P>) {
+        self.groups.put_back(group);
     }
 
     /// Appends a packet that was dropped at its offer.

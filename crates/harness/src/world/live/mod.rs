@@ -119,12 +119,12 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         }
         // A tick includes the changes and deliveries of its instant.
         if self.schedule.next_instant() == Some(at) {
-            return self.step(observer, watch);
+            return self.step(1, observer, watch);
         }
         self.now = at;
         self.change(at);
         self.deliver(at, observer, watch)?;
-        Ok(Step::Ticked)
+        Ok(Step::Ticked(1))
     }
 
     /// Takes in a sample from the process of the peer at index `place`. Everything before `at` must have been computed, nothing at `at`.
