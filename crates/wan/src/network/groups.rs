@@ -23,7 +23,7 @@ pub(super) struct Group<P> {
     pub(super) next: NodeId,
     /// First node after the receivers. The sender is no receiver.
     pub(super) end: u16,
-    /// First link of the sender: the link to node 0, if there were one. Numbers of links wrap around, because a single packet may be on any link.
+    /// First link of the sender: the link to node 0, if there were one.
     pub(super) first: LinkId,
     pub(super) size: SizeAndMarks,
     pub(super) payload: P,
@@ -39,16 +39,18 @@ impl<P: Clone> Group<P> {
         self.next.0 + 1 >= self.end
     }
 
-    /// Returns the packet of an event on a link that is not a wake.
+    /// Returns the receiver after `to` of packets from the node `from`.
     #[inline(always)]
-    pub(super) fn single(event: Pending<P>) -> Option<Self> {
-        let Pending { at, sequence, offered, turn, path: Path { from, to }, size, payload, .. } = event;
-        let first = LinkId(turn.link().0.wrapping_sub(to.0.into()));
-        Some(Self { at, offered, sequence, from, next: to, end: to.0 + 1, first, size, payload: payload? })
+    pub(super) const fn after(from: NodeId, to: u16) -> u16 {
+        if to + 1 == from.0 { to + 2 } else { to + 1 }
+    }
+
+    const fn link(&self, to: u16) -> LinkId {
+        LinkId(self.first.0 + to as u32)
     }
 
     const fn line(&self, to: u16) -> LineId {
-        LineId::Link(self.first.to_receiver(to))
+        LineId::Link(self.link(to))
     }
 
     const fn path(&self) -> Path {
@@ -57,15 +59,14 @@ impl<P: Clone> Group<P> {
 
     /// Removes and returns the next packet, with its link; `None` after the last packet.
     #[inline(always)]
-    pub(super) fn pop(&mut self) -> Option<(LineId, InNetwork<P>)> {
+    pub(super) fn pop(&mut self) -> Option<(LinkId, InNetwork<P>)> {
         let Self { offered, sequence, next, size, .. } = *self;
         if next.0 >= self.end {
             return None;
         }
         let packet = InNetwork { sequence, offered, entered: offered, path: self.path(), size, payload: self.payload.clone() };
-        let after = next.0 + 1;
-        self.next = NodeId(if after == self.from.0 { after + 1 } else { after });
-        Some((self.line(next.0), packet))
+        self.next = NodeId(Self::after(self.from, next.0));
+        Some((self.link(next.0), packet))
     }
 }
 
@@ -114,8 +115,8 @@ impl<P: Clone> Groups<P> {
     #[inline(always)]
     pub(super) fn take(&mut self) -> Option<Pending<P>> {
         let group = self.0.front_mut()?;
-        let (line, InNetwork { sequence, offered, entered, path, size, payload }) = group.pop()?;
-        let (at, turn) = (group.at, Turn::arrival(line));
+        let (link, InNetwork { sequence, offered, entered, path, size, payload }) = group.pop()?;
+        let (at, turn) = (group.at, Turn::arrival(LineId::Link(link)));
         if group.next.0 >= group.end {
             self.0.drop_front();
         }

@@ -49,10 +49,4 @@ impl LinkId {
     pub const fn index(self) -> usize {
         self.0 as usize
     }
-
-    /// Returns the link to the node `to`, if `self` is the first link of a sender: see [`Group`](super::groups::Group).
-    #[inline(always)]
-    pub(super) const fn to_receiver(self, to: u16) -> Self {
-        Self(self.0.wrapping_add(to as u32))
-    }
 }

@@ -42,7 +42,7 @@ use id::{LinkId, NodeId, Path};
 use lines::Lines;
 use on_demand::OnDemand;
 use paths::Paths;
-use pending::{InNetwork, LineId, SizeAndMarks};
+use pending::{InNetwork, LineId, Pending, SizeAndMarks};
 use traffic::Traffic;
 
 use crate::fates::fate::Fate;
@@ -443,38 +443,17 @@ impl<P: Clone> Network<P> {
         let Self { now, traffic, lines, .. } = self;
         // An arrival drops no packet, so one instant holds for all arrivals.
         let until = traffic.until(*now);
-        while let Some(group) = traffic.pop_arrivals(until) {
-            // Without inner events, no engine is woken, no packet has passed another line before its link, and no packet is damaged.
-            let is_single = group.is_single();
-            let Group { at, offered, sequence, from, next: NodeId(mut to), end, first, size, payload } = group;
-            let mut payload = Some(payload);
-            loop {
-                let link = first.to_receiver(to);
-                let line = lines.link_mut(link);
-                if size.has(SizeAndMarks::TRAIN) {
-                    line.deliver_further(size.further_packets(), offered, at);
-                }
-                line.deliver(offered, at);
-                let own = payload.take()?;
-                // A single packet has the payload itself: its payload is never copied.
-                if !is_single {
-                    payload = Some(own.clone());
-                }
-                let packet = InNetwork { sequence, offered, entered: offered, path: Path { from, to: NodeId(to) }, size, payload: own };
-                let ended = take(packet.event(LineId::Link(link), at, Fate::Delivered(at), None));
-                to = if to + 1 == from.0 { to + 2 } else { to + 1 };
-                if let ControlFlow::Break(value) = ended {
-                    if let Some(payload) = payload.filter(|_| to < end) {
-                        traffic.put_back(Group { at, offered, sequence, from, next: NodeId(to), end, first, size, payload });
-                    }
-                    return Some(value);
-                }
-                if to >= end {
-                    break;
-                }
+        loop {
+            let ended = if let Some(group) = traffic.pop_group(until) {
+                arrive_together(group, traffic, lines, &mut take)
+            } else {
+                let Pending { at, sequence, offered, entered, turn, path, size, payload } = traffic.pop_until(until)?;
+                arrive(InNetwork { sequence, offered, entered, path, size, payload: payload? }, turn.link(), at, lines, &mut take)
+            };
+            if let ControlFlow::Break(value) = ended {
+                return Some(value);
             }
         }
-        None
     }
 
     /// Changes the model of a link from `now` on: see [`crate::Link::set_model`].
@@ -548,4 +527,47 @@ impl<P: Clone> Network<P> {
 /// Returns the number of nodes of a network with links between all nodes. Panics with more than [`MOST_NODES`] nodes.
 fn nodes_of_all(config: &NetworkConfig) -> u16 {
     u16::try_from(config.nodes.len()).ok().filter(|nodes| usize::from(*nodes) <= MOST_NODES).expect("a network has at most 23,170 nodes")
+}
+
+/// Hands over the packets of a group, which have arrived at one instant, until `take` breaks. Not inlined, so that the loop over single packets has the registers
+/// for itself (`benches/peers`, datagrams all the time).
+#[inline(never)]
+fn arrive_together<P: Clone, T>(
+    group: Group<P>,
+    traffic: &mut Traffic<P>,
+    lines: &mut Lines<P>,
+    take: &mut impl FnMut(PacketEvent<P, Path>) -> ControlFlow<T>,
+) -> ControlFlow<T> {
+    // Kept in registers, and written back only for a break.
+    let Group { at, offered, sequence, from, next: NodeId(mut to), end, first, size, payload } = group;
+    while to < end {
+        let packet = InNetwork { sequence, offered, entered: offered, path: Path { from, to: NodeId(to) }, size, payload: payload.clone() };
+        let ended = arrive(packet, LinkId(first.0 + u32::from(to)), at, lines, take);
+        to = Group::<P>::after(from, to);
+        if ended.is_break() {
+            if to < end {
+                traffic.put_back(Group { at, offered, sequence, from, next: NodeId(to), end, first, size, payload });
+            }
+            return ended;
+        }
+    }
+    ControlFlow::Continue(())
+}
+
+/// Hands over a packet that has arrived at `at`. Without inner events, no engine is woken, no packet has passed another line before its link, and no packet is
+/// damaged.
+#[inline(always)]
+fn arrive<P: Clone, T>(
+    packet: InNetwork<P>,
+    link: LinkId,
+    at: Instant,
+    lines: &mut Lines<P>,
+    take: &mut impl FnMut(PacketEvent<P, Path>) -> ControlFlow<T>,
+) -> ControlFlow<T> {
+    let line = lines.link_mut(link);
+    if packet.size.has(SizeAndMarks::TRAIN) {
+        line.deliver_further(packet.size.further_packets(), packet.entered, at);
+    }
+    line.deliver(packet.entered, at);
+    take(packet.event(LineId::Link(link), at, Fate::Delivered(at), None))
 }

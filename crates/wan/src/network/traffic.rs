@@ -66,12 +66,7 @@ impl<P: Clone> Traffic<P> {
     /// Removes and returns the first event if its instant is at most `now`, and at most the instant of the first packet in `dropped`.
     #[inline(always)]
     pub(super) fn pop_due(&mut self, now: Instant) -> Option<Pending<P>> {
-        let until = self.until(now);
-        match self.groups.due_key(until) {
-            // In most networks with groups the queue is empty.
-            Some(key) if self.pending.len() == 0 || self.pending.due_key(until).is_none_or(|other| key < other) => self.groups.take(),
-            Some(_) | None => self.pending.take_due(until, |pending| pending),
-        }
+        self.pop_until(self.until(now))
     }
 
     /// Returns the latest instant of events that come before the first packet in `dropped`, at most `now`.
@@ -80,21 +75,25 @@ impl<P: Clone> Traffic<P> {
         now.min(self.first_dropped)
     }
 
-    /// Removes and returns the first packets in a network without inner events, if their instant is at most `until`, an instant from [`Traffic::until`]: a whole
-    /// group if no other event is due, and a single packet otherwise. The caller [puts back](Traffic::put_back) what it does not take of a group.
+    /// Removes and returns the first event if its instant is at most `until`, an instant from [`Traffic::until`].
     #[inline(always)]
-    pub(super) fn pop_arrivals(&mut self, until: Instant) -> Option<Group<P>> {
-        let key = self.groups.due_key(until);
-        // In most networks with groups the queue is empty.
-        let other = if key.is_none() || self.pending.len() == 0 { None } else { self.pending.due_key(until) };
-        match (key, other) {
-            (Some(_), None) => self.groups.take_group(),
-            (Some(key), Some(other)) if key < other => self.groups.take().and_then(Group::single),
-            (Some(_) | None, Some(_) | None) => self.pending.take_due(until, Group::single)?,
+    pub(super) fn pop_until(&mut self, until: Instant) -> Option<Pending<P>> {
+        match self.groups.due_key(until) {
+            // In most networks with groups the queue is empty.
+            Some(key) if self.pending.len() == 0 || self.pending.due_key(until).is_none_or(|other| key < other) => self.groups.take(),
+            Some(_) | None => self.pending.take_due(until, |pending| pending),
         }
     }
 
-    /// Puts back the rest of a group from [`Traffic::pop_arrivals`].
+    /// Removes and returns the first group, if its packets are due at `until`, an instant from [`Traffic::until`], and no event of the queue is due. The caller
+    /// [puts back](Traffic::put_back) what it does not take of the group.
+    #[inline(always)]
+    pub(super) fn pop_group(&mut self, until: Instant) -> Option<Group<P>> {
+        let is_due = self.groups.next_at().is_some_and(|at| at <= until);
+        if is_due && (self.pending.len() == 0 || self.pending.due_key(until).is_none()) { self.groups.take_group() } else { None }
+    }
+
+    /// Puts back the rest of a group from [`Traffic::pop_group`].
     #[cold]
     pub(super) fn put_back(&mut self, group: Group<P>) {
         self.groups.put_back(group);
@@ -119,8 +118,8 @@ impl<P: Clone> Traffic<P> {
         if !group.is_single() && self.awaited.is_none() && self.groups.takes(&group) {
             return self.groups.push(group);
         }
-        while let Some((line, packet)) = group.pop() {
-            self.schedule(group.at, line, packet);
+        while let Some((link, packet)) = group.pop() {
+            self.schedule(group.at, LineId::Link(link), packet);
         }
     }
 
