@@ -127,3 +127,18 @@ properties! {
         prop_assert_eq!(&events(|_| usize::MAX), &late);
     }
 }
+
+/// A driver that stops in the middle of a broadcast finds the other packets at the next poll.
+#[test]
+fn the_rest_of_a_broadcast_waits_for_the_next_poll() {
+    let link = LinkConfig { delay: Delay::constant(Duration::from_micros(5)), ..LinkConfig::default() };
+    let mut network = Plan { nodes: 4, links: vec![link; 16], uplinks: vec![None; 4], downlinks: vec![None; 4] }.build(false);
+    for (from, number) in [(1, 0), (2, 1)] {
+        network.handle_broadcast(Instant::ZERO, NodeId(from), Bytes::new(64), number).unwrap();
+    }
+    network.handle_timeout(Instant::from_nanos(5000)).unwrap();
+    let mut next = || network.take_mere_arrivals(ControlFlow::Break).map(|event| (event.path.from.index(), event.path.to.index()));
+    let found: Vec<_> = std::iter::from_fn(&mut next).collect();
+    assert_eq!(found, [(1, 0), (1, 2), (1, 3), (2, 0), (2, 1), (2, 3)]);
+    assert_eq!(network.poll_event(), None);
+}
