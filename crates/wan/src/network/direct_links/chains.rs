@@ -5,7 +5,9 @@ use alloc::vec::Vec;
 
 use cohaptic_units::{Instant, Probability};
 
+use super::kind::Chain;
 use super::losses::{Losses, Verdict};
+use super::together::{Eight, eight_from};
 use super::{Arrivals, DirectLinks, LinkState};
 use crate::laws::delay::GammaCubics;
 use crate::line::direct::Words;
@@ -25,12 +27,14 @@ pub(super) struct Chains {
     cubics: GammaCubics,
 }
 
-/// State of the chain of delays and of the chain of losses, indexed by link. Padded by seven links, so a load of eight links starting at any link stays within
+/// State of the chain of delays and of the chain of losses, indexed by link, for links without further state. Padded by seven links, so a load of eight links starting at any link stays within
 /// the arrays.
 #[derive(Clone, Debug)]
 pub(super) struct ChainStates {
     /// Latest value of the chain of delays; NaN before the first packet.
     normals: Vec<f64>,
+    /// Instant of the latest value of the chain of delays. Without meaning for links of a kind with [`Chains`], whose correlation does not depend on time.
+    at: Vec<Instant>,
     /// One bit per link, set if the link's chain of losses is in the bad state.
     bad: Vec<u8>,
 }
@@ -94,7 +98,7 @@ impl Chains {
     #[inline(always)]
     pub(super) fn offer(
         &self,
-        (links, states, first): (&mut [LinkState], &mut ChainStates, usize),
+        (links, states, first): (&mut Eight<LinkState>, &mut ChainStates, usize),
         (now, until): (Instant, Instant),
         excluded: u8,
         arrivals: &mut Arrivals,
@@ -113,11 +117,11 @@ impl Chains {
         // Lost packets change the state too. Links in `excluded` got no packet and keep their state.
         states.change(first, leave & !excluded);
         // The padding makes the load valid for every existing link.
-        let Some(normals) = states.normals_from(first) else { return };
+        let Some(normals) = eight_from(&mut states.normals, first) else { return };
         let following = self.delays.following(normals, &jitter_words);
         let nanos = self.cubics.nanos(&following);
         let (mut bit, mut arrive, mut overtake, mut slow) = (1_u8, 0, 0, 0);
-        for place in 0..links.len().min(DirectLinks::AT_ONCE) {
+        for place in 0..DirectLinks::AT_ONCE {
             let link = &mut links[place];
             if excluded & bit == 0 {
                 link.offered += 1;
@@ -147,7 +151,7 @@ impl Chains {
     #[cold]
     fn offer_slowly(
         &self,
-        (links, normals): (&mut [LinkState], &mut [f64; DirectLinks::AT_ONCE]),
+        (links, normals): (&mut Eight<LinkState>, &mut Eight<f64>),
         (now, until): (Instant, Instant),
         slow: u8,
         arrivals: &mut Arrivals,
@@ -166,7 +170,7 @@ impl Chains {
 
 impl ChainStates {
     pub(super) const fn new() -> Self {
-        Self { normals: Vec::new(), bad: Vec::new() }
+        Self { normals: Vec::new(), at: Vec::new(), bad: Vec::new() }
     }
 
     /// Sets the initial state of link `place`. The number must be higher than all numbers before.
@@ -178,10 +182,22 @@ impl ChainStates {
         self.change(place, u8::from(state == GilbertElliottState::Bad));
     }
 
-    /// Returns the latest values of the chains of eight links from `first` on.
+    /// Begins the chain of delays of link `place`, which is its only state. The number must be higher than all numbers before.
+    pub(super) fn begin_delays(&mut self, place: usize) {
+        self.normals.resize(place + DirectLinks::AT_ONCE, f64::NAN);
+        self.at.resize(place + DirectLinks::AT_ONCE, Instant::MAX);
+    }
+
+    /// Returns the chain of delays of link `place`, one of those that [`begin_delays`](Self::begin_delays) began.
+    #[inline]
+    pub(super) fn delay(&mut self, place: usize) -> Chain<'_> {
+        Chain { latest: &mut self.normals[place], at: &mut self.at[place], next: f64::NAN }
+    }
+
+    /// Returns the latest values of the chains of eight links from `first` on, and the instants of these values.
     #[inline(always)]
-    fn normals_from(&mut self, first: usize) -> Option<&mut [f64; DirectLinks::AT_ONCE]> {
-        self.normals.get_mut(first..)?.first_chunk_mut()
+    pub(super) fn delays_from(&mut self, first: usize) -> Option<(&mut Eight<f64>, &mut Eight<Instant>)> {
+        Some((eight_from(&mut self.normals, first)?, eight_from(&mut self.at, first)?))
     }
 
     /// Returns one bit for each of eight links from `first` on, set if the link is in the bad state.

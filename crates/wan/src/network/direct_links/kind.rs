@@ -48,6 +48,17 @@ enum Delays {
     Correlated(CorrelatedDelays),
 }
 
+/// Chain of delays of a link.
+#[derive(Debug)]
+pub(super) struct Chain<'a> {
+    /// Latest value, NaN before the first packet.
+    pub(super) latest: &'a mut f64,
+    /// Instant of the latest value.
+    pub(super) at: &'a mut Instant,
+    /// Next value. Without meaning if the packet's delay is drawn alone.
+    pub(super) next: f64,
+}
+
 /// State of a link from earlier packets, and a counter for few links.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Remembered {
@@ -131,34 +142,27 @@ impl Kind {
         if let Line::Free(nanos) = self.line { now.saturating_add_nanos(nanos) } else { now }
     }
 
-    /// Computes the fate of a packet that leaves the transmitter at `leaves`, of a link without state, or with a chain of delays as its only state: `chain` is
-    /// the state and the next value of the chain, and the state is changed. `delay` is the packet's delay \[ns\], or [`Law::UNKNOWN`] to draw the delay.
+    /// Computes the fate of a packet that leaves the transmitter at `leaves`, of a link without state, or with a chain of delays as its only state, which is
+    /// changed. `at` is the arrival \[ns\], or [`Law::UNKNOWN`] to draw the delay.
     #[inline(always)]
-    pub(super) fn fate(
-        &mut self,
-        leaves: Instant,
-        chain: Option<(&mut Remembered, f64)>,
-        words: Words,
-        packet: impl Fn() -> PacketDraws,
-        delay: u64,
-    ) -> Verdict {
+    pub(super) fn fate(&mut self, leaves: Instant, chain: Option<Chain<'_>>, words: Words, packet: impl Fn() -> PacketDraws, at: u64) -> Verdict {
         if is_below(words[0], self.loses_below) {
             return Verdict::Lost;
         }
-        if delay == Law::UNKNOWN {
-            let mut nothing = Remembered::NOTHING;
-            let link = chain.map_or(&mut nothing, |(link, _)| link);
-            return Verdict::Arrives(self.arrival(leaves, link, words, packet()));
+        if at == Law::UNKNOWN {
+            let (mut latest, mut since) = (f64::NAN, Instant::MAX);
+            let chain = chain.map_or((&mut latest, &mut since), |chain| (chain.latest, chain.at));
+            return Verdict::Arrives(self.arrival(leaves, chain, words, packet()));
         }
-        if let Some((link, value)) = chain {
-            (link.normal, link.at) = (value, leaves);
+        if let Some(chain) = chain {
+            (*chain.latest, *chain.at) = (chain.next, leaves);
         }
-        Verdict::Arrives(leaves.saturating_add_nanos(delay))
+        Verdict::Arrives(Instant::from_nanos(at))
     }
 
     /// Returns the delays of a packet of each of several links \[ns\], or [`Law::UNKNOWN`] where [`Kind::fate`] or [`Kind::verdict`] must draw the delay.
     #[inline(always)]
-    pub(super) fn delays<const N: usize>(&self, words: &[Words; N]) -> [u64; N] {
+    fn delays<const N: usize>(&self, words: &[Words; N]) -> [u64; N] {
         let Delays::Independent(delay) = &self.delay else { return [Law::UNKNOWN; N] };
         let mut of_jitter = [0; N];
         for (of_jitter, [_, word]) in of_jitter.iter_mut().zip(words) {
@@ -193,7 +197,7 @@ impl Kind {
             },
         };
         if delay == Law::UNKNOWN {
-            return Verdict::Arrives(self.arrival(leaves, link, words, packet()));
+            return Verdict::Arrives(self.arrival(leaves, link.chain(), words, packet()));
         }
         // A link without a chain of delays may have its instant for a chain of losses.
         if let Delays::Correlated(_) = self.delay {
@@ -216,14 +220,28 @@ impl Kind {
     /// Returns the latest values of the chains of delays of links with these states, whose packets are offered `now`. A value is NaN where the next value must
     /// be computed by [`Kind::verdict`].
     #[inline(always)]
-    pub(super) fn values_of_chains<const N: usize>(&self, now: Instant, links: &[Remembered]) -> [f64; N] {
-        let mut values = [f64::NAN; N];
+    pub(super) fn values_of_states<const N: usize>(&self, now: Instant, links: &[Remembered; N]) -> [f64; N] {
         // The delays of chains begin together only where no packet waits.
-        if let (Delays::Correlated(delays), Line::Free(time)) = (&self.delay, self.line) {
-            let leaves = now.saturating_add_nanos(time);
-            for (value, link) in values.iter_mut().zip(links) {
-                *value = if delays.has_weights(leaves, link.at) { link.normal } else { f64::NAN };
-            }
+        if !matches!(self.line, Line::Free(_)) {
+            return [f64::NAN; N];
+        }
+        let (mut latest, mut at) = ([f64::NAN; N], [Instant::MAX; N]);
+        for (link, (latest, at)) in links.iter().zip(latest.iter_mut().zip(&mut at)) {
+            (*latest, *at) = (link.normal, link.at);
+        }
+        self.values_of_chains(now, &latest, &at)
+    }
+
+    /// Returns the values of [`Kind::values_of_states`] for links with these latest values, of the instants `at`.
+    #[inline(always)]
+    pub(super) fn values_of_chains<const N: usize>(&self, now: Instant, latest: &[f64; N], at: &[Instant; N]) -> [f64; N] {
+        let Delays::Correlated(delays) = &self.delay else { return [f64::NAN; N] };
+        let Some(since) = delays.since(self.leaves(now)) else { return *latest };
+        let mut values = [0.0; N];
+        for (value, (latest, at)) in values.iter_mut().zip(latest.iter().zip(at)) {
+            // A NaN has all bits set here. Of a choice between two numbers the compiler made a branch.
+            let has_other_weights = u64::from(*at != since);
+            *value = f64::from_bits(latest.to_bits() | has_other_weights.wrapping_neg());
         }
         values
     }
@@ -239,13 +257,14 @@ impl Kind {
         delays.nanos_at_once(chains, &of_jitter)
     }
 
-    /// Returns the arrival of a packet that leaves the transmitter at `leaves`, without the order of packets. Not inlined, because most delays are drawn for
+    /// Returns the arrival of a packet that leaves the transmitter at `leaves`, without the order of packets. `chain` is the latest value of the link's chain of
+    /// delays and the instant of the value, and both are replaced if there is a chain. Not inlined, because most delays are drawn for
     /// several links together.
     #[inline(never)]
-    pub(super) fn arrival(&mut self, leaves: Instant, link: &mut Remembered, [_, word]: Words, packet: PacketDraws) -> Instant {
+    pub(super) fn arrival(&mut self, leaves: Instant, chain: (&mut f64, &mut Instant), [_, word]: Words, packet: PacketDraws) -> Instant {
         leaves.saturating_add_nanos(match &mut self.delay {
             Delays::Independent(delay) => delay.draw_nanos(leaves, word, || packet),
-            Delays::Correlated(delays) => delays.draw_nanos(leaves, (&mut link.normal, &mut link.at), word, packet),
+            Delays::Correlated(delays) => delays.draw_nanos(leaves, chain, word, packet),
         })
     }
 }
@@ -254,6 +273,12 @@ impl Remembered {
     /// The state of a link without state.
     pub(super) const NOTHING: Self =
         Self { departure: Instant::ZERO, normal: f64::NAN, at: Instant::MAX, state: GilbertElliottState::Good, found_full: 0 };
+
+    /// Returns the latest value of the chain of delays and its instant.
+    #[inline]
+    pub(super) const fn chain(&mut self) -> (&mut f64, &mut Instant) {
+        (&mut self.normal, &mut self.at)
+    }
 
     /// Returns whether a packet is lost by a chain in time, and moves the chain. Not inlined, because few links have such a chain.
     #[inline(never)]

@@ -143,6 +143,6 @@ impl Kinds {
         let mut ahead = (**states).clone();
         let leaves = ahead.departure_over_changes(now, |_, _| ());
         let kind = &mut self.all[ahead.present()];
-        (Verdict::Arrives(kind.arrival(leaves, link, words, packet)), kind.keeps_order)
+        (Verdict::Arrives(kind.arrival(leaves, link.chain(), words, packet)), kind.keeps_order)
     }
 }

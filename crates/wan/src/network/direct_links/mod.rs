@@ -5,16 +5,18 @@ mod kind;
 mod kinds;
 mod losses;
 mod switching;
+mod together;
 
 use alloc::vec::Vec;
 
 use cohaptic_units::Instant;
 
 use chains::ChainStates;
-use kind::{Kind, Line, Remembered};
+use kind::{Line, Remembered};
 use kinds::Kinds;
 use losses::Verdict;
 use switching::Switching;
+use together::{States, eight_from};
 
 use super::id::LinkId;
 use crate::fates::fate::DropCause;
@@ -34,19 +36,22 @@ use crate::stages::queue::Load;
 /// a driver with arrivals on a lattice can use a simpler queue. The driver gives the end of its interest, so a packet is counted as delivered or not at its
 /// offer.
 ///
-/// Links are numbered from 0 in the order of addition. A link without state takes one cache line, and most links with state take 40 bytes
-/// besides.
+/// Links are numbered from 0 in the order of addition. A link without state takes one cache line. A chain of delays takes 16 bytes besides, and most links with
+/// other state take 40 bytes besides.
 #[derive(Clone, Debug)]
 pub struct DirectLinks {
     /// End of the run. Packets with a later arrival do not count as delivered.
     until: Instant,
     load: Load,
+    /// Number of links.
+    count: usize,
+    /// State of each link, indexed by link. The arrays here and below are padded, so that there are eight entries from any link on.
     links: Vec<LinkState>,
     /// Kinds of links, and the data shared by the links of one model. Indexed by the number in [`Memory`].
     kinds: Vec<Kinds>,
-    /// State of each link, indexed by link. Shorter than `links`, or empty, if the last links, or all links, need no such state.
+    /// State of links in [`Memory::Remembering`], indexed by link. Empty if no link needs such state.
     remembered: Vec<Remembered>,
-    /// State of links in [`Memory::Chained`], indexed by link.
+    /// State of links in [`Memory::Chained`] and [`Memory::Delayed`], indexed by link.
     chained: ChainStates,
     /// Links of no kind, indexed by the number in [`Memory::Other`].
     others: Vec<Other>,
@@ -63,9 +68,9 @@ pub struct Arrivals {
     pub arrive: u8,
     /// Bits of the links with a packet arriving before an earlier packet. A subset of `arrive`.
     pub overtake: u8,
-    /// Bits of the links with a packet that waits, for the order of packets: the packet arrives together with an earlier packet. A subset of `arrive`. Links
-    /// that are not computed together may have no bit for a packet that waits.
-    pub wait: u8,
+    /// `true` for each packet that waits, for the order of packets: the packet arrives together with an earlier packet. Links that are not computed together may
+    /// have `false` for a packet that waits. Without meaning where the bit in `arrive` is clear.
+    pub wait: [bool; DirectLinks::AT_ONCE],
     /// Number of each packet on its link, from 0.
     pub sequences: [u64; DirectLinks::AT_ONCE],
     /// Arrival of each packet. Without meaning where the bit in `arrive` is clear.
@@ -95,6 +100,8 @@ enum Memory {
     Remembering(u16),
     /// A link of this kind, with its state in `chained`.
     Chained(u16),
+    /// A link of this kind, whose chain of delays is its only state, in `chained`.
+    Delayed(u16),
     /// A link of no kind: the index in `others`.
     Other(u32),
 }
@@ -133,6 +140,7 @@ impl DirectLinks {
         Self {
             until,
             load,
+            count: 0,
             links: Vec::new(),
             kinds: Vec::new(),
             remembered: Vec::new(),
@@ -172,14 +180,18 @@ impl DirectLinks {
             Some((place, kinds)) => {
                 let (only, remember) = (kinds.only(), kinds.remember);
                 let (has_chains, state) = only.map_or((false, Remembered::NOTHING), |kind| (kind.chains.is_some(), kind.beginning(draws)));
+                let has_only_delays = only.is_some_and(|kind| kind.has_only_delays);
                 // Chains come first: a kind with chains has state too, but keeps it in arrays for eight links at once.
+                // Links added since the last link with state have no state. Their entries keep the index equal to the link's number.
                 if has_chains {
-                    self.chained.begin(self.links.len(), state.state);
+                    self.chained.begin(self.count, state.state);
                     Memory::Chained(place)
+                } else if has_only_delays {
+                    self.chained.begin_delays(self.count);
+                    Memory::Delayed(place)
                 } else if remember {
-                    // Links added since the last link with state have no state. Their entries keep the index equal to the link's number.
-                    self.remembered.resize(self.links.len(), Remembered::NOTHING);
-                    self.remembered.push(state);
+                    self.remembered.resize(self.count + Self::AT_ONCE, Remembered::NOTHING);
+                    self.remembered[self.count] = state;
                     Memory::Remembering(place)
                 } else {
                     Memory::Plain(place)
@@ -190,7 +202,10 @@ impl DirectLinks {
                 None => return false,
             },
         };
-        self.links.push(LinkState::new(draws, memory));
+        let link = LinkState::new(draws, memory);
+        self.links.resize(self.count + Self::AT_ONCE, link.clone());
+        self.links[self.count] = link;
+        self.count += 1;
         true
     }
 
@@ -251,34 +266,45 @@ impl DirectLinks {
     /// Like [`DirectLinks::offer`].
     #[inline(always)]
     pub fn offer_as<const CHAINS: bool>(&mut self, now: Instant, first: LinkId, count: usize, excluded: u8, arrivals: &mut Arrivals) {
-        (arrivals.arrive, arrivals.overtake, arrivals.wait) = (0, 0, 0);
+        (arrivals.arrive, arrivals.overtake, arrivals.wait) = (0, 0, [false; Self::AT_ONCE]);
         let first = first.index();
+        assert!(first + count <= self.count, "of {} links, links {first} to {} are missing", self.count, first + count);
+        // The links after the last one of these are left out, too.
+        let [beyond, _] = (u16::from(u8::MAX) << count).to_le_bytes();
+        let excluded = excluded | beyond;
         #[cfg(debug_assertions)]
         (0..count).filter(|place| excluded >> place & 1 == 0).for_each(|place| self.assert_load(now, first + place));
         // With at most two links left, the joint draw for eight links would cost more than single offers.
-        let are_few = count == Self::AT_ONCE && excluded.count_zeros() <= 2;
+        let are_few = excluded.count_zeros() <= 2;
         let kind = match &mut self.kinds[..] {
             [kinds] if !are_few && self.others.is_empty() => kinds.at(now),
             _ => None,
         };
-        let Some(kind) = kind else { return self.offer_one_by_one(now, first, count, excluded, arrivals) };
-        let (links, span) = (&mut self.links[first..first + count], (now, self.until));
+        let (Some(kind), Some(links)) = (kind, eight_from(&mut self.links, first)) else {
+            return self.offer_one_by_one(now, first, excluded, arrivals);
+        };
+        let span = (now, self.until);
         // Inlined into the driver's loop, which may be compiled for wider registers than a function of its own.
         match &kind.chains {
             Some(chains) if CHAINS => chains.offer((links, &mut self.chained, first), span, excluded, arrivals),
             // A wrong value of `CHAINS` is slow, but gives the same answers.
-            Some(_) => self.offer_one_by_one(now, first, count, excluded, arrivals),
-            None if CHAINS => self.offer_one_by_one(now, first, count, excluded, arrivals),
-            None if !kind.remembers => alike::<false, false>(kind, (links, &mut []), span, excluded, arrivals),
-            // Every link of the kind has an entry in `remembered`.
-            None if kind.has_only_delays => alike::<true, false>(kind, (links, &mut self.remembered[first..first + count]), span, excluded, arrivals),
-            None => alike::<true, true>(kind, (links, &mut self.remembered[first..first + count]), span, excluded, arrivals),
+            Some(_) => self.offer_one_by_one(now, first, excluded, arrivals),
+            None if CHAINS => self.offer_one_by_one(now, first, excluded, arrivals),
+            None if !kind.remembers => States::Nothing.offer(kind, links, span, excluded, arrivals),
+            None if kind.has_only_delays => match self.chained.delays_from(first) {
+                Some((latest, at)) => States::Delays(latest, at).offer(kind, links, span, excluded, arrivals),
+                None => unreachable!("each link of the kind has a chain of delays"),
+            },
+            None => match eight_from(&mut self.remembered, first) {
+                Some(remembered) => States::All(remembered).offer(kind, links, span, excluded, arrivals),
+                None => unreachable!("each link of the kind has state"),
+            },
         }
     }
 
     #[inline(never)]
-    fn offer_one_by_one(&mut self, now: Instant, first: usize, count: usize, excluded: u8, arrivals: &mut Arrivals) {
-        for place in (0..count).filter(|place| excluded >> place & 1 == 0) {
+    fn offer_one_by_one(&mut self, now: Instant, first: usize, excluded: u8, arrivals: &mut Arrivals) {
+        for place in (0..Self::AT_ONCE).filter(|place| excluded >> place & 1 == 0) {
             let link = LinkId::new(first + place);
             arrivals.sequences[place] = self.offered(link);
             if let Some((at, overtakes)) = self.offer_alone(now, link) {
@@ -289,6 +315,12 @@ impl DirectLinks {
         }
     }
 
+    /// Returns the state of a link.
+    #[inline]
+    fn link(&self, link: LinkId) -> &LinkState {
+        &self.links[..self.count][link.index()]
+    }
+
     /// Returns the number of packets offered to a link.
     ///
     /// # Panics
@@ -297,7 +329,7 @@ impl DirectLinks {
     #[must_use]
     #[inline]
     pub fn offered(&self, link: LinkId) -> u64 {
-        self.links[link.index()].offered
+        self.link(link).offered
     }
 
     /// Offers a packet to a single link, and returns the packet's arrival and whether the packet overtakes an earlier packet. Returns `None` if the
@@ -316,8 +348,8 @@ impl DirectLinks {
     /// Checks the instant `now` of a packet offered to `link` against the load.
     #[cfg(debug_assertions)]
     fn assert_load(&mut self, now: Instant, link: usize) {
-        if self.latest_offers.len() < self.links.len() {
-            self.latest_offers.resize(self.links.len(), None);
+        if self.latest_offers.len() < self.count {
+            self.latest_offers.resize(self.count, None);
         }
         let (before, gap) = (self.latest_offers[link].replace(now), self.load.gap);
         // The first packet of a link has no gap before it, and passes the check.
@@ -328,7 +360,7 @@ impl DirectLinks {
     #[inline]
     fn offer_alone(&mut self, now: Instant, link: LinkId) -> Option<(Instant, bool)> {
         let place = link.index();
-        let link = &mut self.links[place];
+        let link = &mut self.links[..self.count][place];
         let (words, draws) = (link.words(&self.kinds), link.draws.packet(link.offered));
         let verdict = match link.memory {
             Memory::Plain(kinds) => {
@@ -340,6 +372,13 @@ impl DirectLinks {
                 let (verdict, keeps_order) = self.kinds[usize::from(kinds)].verdict(now, &mut self.remembered[place], words, draws);
                 verdict.map(|at| link.in_order(keeps_order, at))
             }
+            Memory::Delayed(kinds) => match self.kinds[usize::from(kinds)].at(now) {
+                Some(kind) => {
+                    let verdict = kind.fate(kind.leaves(now), Some(self.chained.delay(place)), words, || draws, Law::UNKNOWN);
+                    verdict.map(|at| link.in_order(kind.keeps_order, at))
+                }
+                None => unreachable!("its kind has no modulator"),
+            },
             Memory::Chained(kinds) => match self.kinds[usize::from(kinds)].only().and_then(|kind| kind.chains.as_ref()) {
                 Some(chains) => chains.verdict(now, &mut self.chained, place, words, draws),
                 None => unreachable!("links of its kind have chains"),
@@ -357,7 +396,7 @@ impl DirectLinks {
     pub fn forget(&mut self, link: LinkId, sent: Instant, arrival: Instant) {
         // A later arrival was never counted.
         if arrival <= self.until {
-            let link = &mut self.links[link.index()];
+            let link = &mut self.links[..self.count][link.index()];
             link.delivered -= 1;
             link.delay_nanos -= u128::from(arrival.as_nanos() - sent.as_nanos());
         }
@@ -370,10 +409,10 @@ impl DirectLinks {
     /// If the link is missing.
     #[must_use]
     pub fn stats(&self, link: LinkId) -> LinkStats {
-        let LinkState { offered, delivered, delay_nanos, lost, memory, .. } = self.links[link.index()];
+        let LinkState { offered, delivered, delay_nanos, lost, memory, .. } = *self.link(link);
         let (outage, found_full) = match memory {
             // A kind without queue drops no packet for want of room, and no kind has outages.
-            Memory::Plain(_) | Memory::Chained(_) => (0, 0),
+            Memory::Plain(_) | Memory::Chained(_) | Memory::Delayed(_) => (0, 0),
             Memory::Remembering(_) => (0, self.remembered[link.index()].found_full),
             Memory::Other(place) => {
                 let Other { line, outage, .. } = &self.others[place as usize];
@@ -437,86 +476,15 @@ impl Other {
     }
 }
 
-/// Offers a packet to each of these links of one kind, with state if `REMEMBER` is set, and with more state than the chain of delays if `MORE` is set, too. All
-/// draws come before all verdicts. The verdict is chosen by constants rather than given as a closure, so the verdict is inlined into the loop.
-#[inline(always)]
-fn alike<const REMEMBER: bool, const MORE: bool>(
-    kind: &mut Kind,
-    (links, remembered): (&mut [LinkState], &mut [Remembered]),
-    (now, until): (Instant, Instant),
-    excluded: u8,
-    arrivals: &mut Arrivals,
-) {
-    // Copied before the draws, so that the copies are in the cache when they are read together.
-    let chains = if REMEMBER { kind.values_of_chains(now, remembered) } else { [f64::NAN; DirectLinks::AT_ONCE] };
-    // The first random words of the next packet of each link, or zeros if the kind is not random.
-    let mut words = [[0; 2]; DirectLinks::AT_ONCE];
-    for (link, (words, sequence)) in links.iter().zip(words.iter_mut().zip(&mut arrivals.sequences)) {
-        *sequence = link.offered;
-        if kind.is_random {
-            *words = link.draws.packet(link.offered).loss_and_jitter();
-        }
-    }
-    let (values, mut delays) = match REMEMBER {
-        true => kind.delays_of_chains(&chains, &words),
-        false => ([f64::NAN; DirectLinks::AT_ONCE], kind.delays(&words)),
-    };
-    let leaves = kind.leaves(now);
-    // With more state, a packet may leave the transmitter later than `leaves`.
-    let held_back = if !MORE && kind.keeps_order { hold_back(links, leaves, &mut delays) } else { 0 };
-    let (mut bit, mut arrive, mut overtake, mut wait) = (1, 0, 0, 0);
-    for place in 0..links.len().min(DirectLinks::AT_ONCE) {
-        let (link, words) = (&mut links[place], words[place]);
-        // An excluded link counts no packet, so its next packet has the same number and random words.
-        if excluded & bit == 0 {
-            // A closure, because only few packets need further draws, for which the parts of the address must be in memory.
-            let (stream, number) = (link.draws, link.offered);
-            let packet = move || stream.packet(number);
-            let verdict = match (REMEMBER, MORE) {
-                (true, true) => kind.verdict(now, &mut remembered[place], words, packet, (values[place], delays[place])),
-                (true, false) => kind.fate(leaves, Some((&mut remembered[place], values[place])), words, packet, delays[place]),
-                (false, _) => kind.fate(leaves, None, words, packet, delays[place]),
-            };
-            link.offered += 1;
-            match verdict {
-                Verdict::Arrives(wanted) => {
-                    let is_in_order = !MORE && delays[place] != Law::UNKNOWN;
-                    let arrival = link.in_order(kind.keeps_order && !is_in_order, wanted);
-                    arrivals.at[place] = arrival;
-                    arrive |= bit;
-                    wait |= u8::from(arrival > wanted) << place;
-                    overtake |= if link.count_arrival(now, until, arrival) { bit } else { 0 };
-                }
-                Verdict::Lost => link.lost += 1,
-                Verdict::Dropped => {}
-            }
-        }
-        bit = bit.wrapping_shl(1);
-    }
-    (arrivals.arrive, arrivals.overtake, arrivals.wait) = (arrive, overtake, wait | held_back & arrive);
-}
-
-/// Lengthens the delays \[ns\] of packets that leave the transmitters of these links at `leaves`, so that no packet arrives before the latest packet of its
-/// link. Returns one bit for each packet that waits. A delay that is not known yet stays unknown.
-///
-/// Nobody can predict which packets wait. Of comparisons in the loop over links the compiler made branches, and here it makes none.
-#[inline(always)]
-fn hold_back(links: &[LinkState], leaves: Instant, delays: &mut [u64; DirectLinks::AT_ONCE]) -> u8 {
-    let mut least = [0; DirectLinks::AT_ONCE];
-    for (least, link) in least.iter_mut().zip(links) {
-        *least = link.latest.as_nanos().saturating_sub(leaves.as_nanos());
-    }
-    let mut wait = 0;
-    for (place, (delay, least)) in delays.iter_mut().zip(least).enumerate() {
-        wait |= u8::from(least > *delay) << place;
-        *delay = least.max(*delay);
-    }
-    wait
-}
-
 impl Arrivals {
     /// No packet arrives.
-    pub const NONE: Self = Self { arrive: 0, overtake: 0, wait: 0, sequences: [0; DirectLinks::AT_ONCE], at: [Instant::ZERO; DirectLinks::AT_ONCE] };
+    pub const NONE: Self = Self {
+        arrive: 0,
+        overtake: 0,
+        wait: [false; DirectLinks::AT_ONCE],
+        sequences: [0; DirectLinks::AT_ONCE],
+        at: [Instant::ZERO; DirectLinks::AT_ONCE],
+    };
 
     /// Returns the array indices of the arriving packets, in ascending order.
     #[inline(always)]
@@ -539,7 +507,7 @@ impl Arrivals {
     /// Returns whether the packet at this array index is known to wait, and so to arrive together with an earlier packet.
     #[must_use]
     pub const fn waits(&self, place: usize) -> bool {
-        self.wait >> place & 1 == 1
+        self.wait[place]
     }
 }
 
@@ -587,7 +555,9 @@ impl LinkState {
     fn words(&self, kinds: &[Kinds]) -> Words {
         match self.memory {
             Memory::Plain(place) | Memory::Remembering(place) if !kinds[usize::from(place)].are_random => [0; 2],
-            Memory::Plain(_) | Memory::Remembering(_) | Memory::Chained(_) | Memory::Other(_) => self.draws.packet(self.offered).loss_and_jitter(),
+            Memory::Plain(_) | Memory::Remembering(_) | Memory::Chained(_) | Memory::Delayed(_) | Memory::Other(_) => {
+                self.draws.packet(self.offered).loss_and_jitter()
+            }
         }
     }
 }

@@ -86,13 +86,12 @@ fn packets_that_wait_have_their_bits() {
     let (mut arrivals, mut latest, mut waiting) = (Arrivals::NONE, [Instant::ZERO; DirectLinks::AT_ONCE], 0);
     for number in 0..500 {
         links.offer(Instant::from_nanos(number * 4_000_000), LinkId::new(0), DirectLinks::AT_ONCE, 0, &mut arrivals);
-        assert_eq!(arrivals.wait & !arrivals.arrive, 0);
         for place in arrivals.places() {
             // Two delays that lead to one nanosecond are too rare to be drawn.
             assert_eq!(arrivals.waits(place), arrivals.at[place] == latest[place], "packet {number} of link {place}");
             latest[place] = arrivals.at[place];
         }
-        waiting += arrivals.wait.count_ones();
+        waiting += arrivals.places().filter(|place| arrivals.waits(*place)).count();
     }
     assert!(waiting > 1000, "{waiting} of 4000 packets");
 }
@@ -387,6 +386,29 @@ fn what_needs_an_engine_is_left_out() {
         assert!(!links.add(1, &LinkName::between("a", "b"), &model(words)), "{words}");
     }
     assert!(links.links.is_empty());
+}
+
+/// The arrays of the links have more entries than there are links.
+#[test]
+fn a_missing_link_is_an_error_of_the_program() {
+    let calls: [fn(&mut DirectLinks, LinkId); 5] = [
+        |links, link| _ = links.offer_one(Instant::ZERO, link),
+        |links, link| _ = links.offered(link),
+        |links, link| _ = links.stats(link),
+        |links, link| links.offer(Instant::ZERO, link, 1, 0, &mut Arrivals::NONE.clone()),
+        // All links from the first to this one.
+        |links, link| links.offer(Instant::ZERO, LinkId::new(0), link.index() + 1, 0, &mut Arrivals::NONE.clone()),
+    ];
+    for (number, call) in calls.into_iter().enumerate() {
+        for link in [2, 3, 7] {
+            let called = std::panic::catch_unwind(|| {
+                let mut links = DirectLinks::new(Instant::MAX, OF_TESTS);
+                (0..3).for_each(|to| assert!(links.add(1, &LinkName::between("a", &to.to_string()), &model("delay 5ms 1ms"))));
+                call(&mut links, LinkId::new(link));
+            });
+            assert_eq!(called.is_ok(), link < 3, "call {number} of link {link}");
+        }
+    }
 }
 
 #[test]

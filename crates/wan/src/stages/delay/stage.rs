@@ -220,11 +220,11 @@ impl CorrelatedDelays {
         (following, nanos)
     }
 
-    /// Returns whether the present weights are those of a packet that begins to propagate `now`, if the latest value of the chain is of the instant `at`. Links
-    /// that are offered packets together have the weights of one span.
+    /// Returns the instant since which the present weights are those of a packet that begins to propagate `now`: the latest value of its chain must be of this
+    /// instant. Links that are offered packets together have the weights of one span. Returns `None` if the weights do not depend on time.
     #[inline(always)]
-    pub(crate) fn has_weights(&self, now: Instant, at: Instant) -> bool {
-        !self.is_in_time() || now.as_nanos().saturating_sub(at.as_nanos()) == self.weights.span
+    pub(crate) fn since(&self, now: Instant) -> Option<Instant> {
+        self.is_in_time().then(|| Instant::from_nanos(now.as_nanos().wrapping_sub(self.weights.span)))
     }
 
     /// Returns whether the correlation depends on the time between packets.
