@@ -81,7 +81,7 @@ pub use link::Link;
 pub use network::direct_links::{Arrivals, DirectLinks};
 pub use network::id::{LinkId, NodeId, Path};
 pub use network::stepped_links::SteppedLinks;
-pub use network::{AccessLine, MOST_NODES, Network, NetworkConfig, NetworkError};
+pub use network::{AccessLine, MOST_NODES, Network, NetworkConfig, NetworkError, TakeArrival};
 pub use packet::{PacketInfo, flow_number};
 pub use ring::Ring;
 pub use stages::config::{LINK_PARAMETERS, Layout, LinkConfig};

@@ -14,7 +14,6 @@ mod remote;
 mod turning;
 mod watch;
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -317,17 +316,13 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         let Self { network, members, samples, remote, axes, .. } = self;
         // The network first computes everything due by now. The events are then polled in the order of time.
         network.handle_timeout(now).expect("instants come in order");
-        let mut receivers = Receivers { members, samples, remote, axes: *axes };
+        let mut receivers = Receivers { members, samples, remote, axes: *axes, now, observer, watch };
         // Nearly all events are simple arrivals. For these the network need not build a complete event.
-        let ended = network.take_mere_arrivals(|event| match receivers.take(now, &event, observer, watch) {
-            Ok(()) => ControlFlow::Continue(()),
-            Err(ended) => ControlFlow::Break(ended),
-        });
-        if let Some(ended) = ended {
+        if let Some(ended) = network.take_mere_arrivals(&mut receivers) {
             return Err(ended);
         }
         // A driver with remote peers asks for awaited instants, which a poll without an event passes.
-        if E::IS_EMPTY && !network.may_have_events(now) { Ok(()) } else { receivers.take_all(network, now, observer, watch) }
+        if E::IS_EMPTY && !network.may_have_events(now) { Ok(()) } else { receivers.take_all(network) }
     }
 
     /// Steps 3 and 4 of an instant: each ticking peer computes its forces and moves to its next tick. Goes on with the instants after `now` at which nothing else

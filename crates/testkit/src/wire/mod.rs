@@ -16,7 +16,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use cohaptic_units::Instant;
-use cohaptic_wan::{AccessLine, DropCause, Fate, LinkModel, LinkStats, Network, NetworkConfig, NodeId, PacketInfo, Path};
+use cohaptic_wan::{AccessLine, DropCause, Fate, LinkModel, LinkStats, Network, NetworkConfig, NodeId, PacketEvent, PacketInfo, Path};
 
 use exits::{Out, counted};
 pub(crate) use held::{BYTE_LIMIT, Held};
@@ -206,7 +206,7 @@ impl<A: HasFlow + Clone> Wire<A> {
     pub(crate) fn poll(&mut self) -> Option<Box<Parcel<A>>> {
         if !self.is_watched {
             // Nothing is watched, so a packet that can only arrive needs no full event. A full event costs more to make.
-            let arrived = self.network.take_mere_arrivals(|event| {
+            let arrived = self.network.take_mere_arrivals(|event: PacketEvent<Box<Parcel<A>>, Path>| {
                 let (path, at, mut parcel) = (event.path, event.at, event.payload);
                 let Arrival { packet, .. } = &mut parcel.arrival;
                 packet.path = path;

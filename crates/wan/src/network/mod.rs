@@ -12,6 +12,7 @@
 //! The module takes packets with a size and an opaque payload, and gives one [`PacketEvent`] per fate of a packet. The module knows no clock and never reads
 //! payloads: the driver gives the time.
 
+mod arrivals;
 mod awaited;
 mod broadcast;
 mod config;
@@ -35,6 +36,7 @@ use core::ops::ControlFlow;
 
 use cohaptic_units::Instant;
 
+pub use arrivals::TakeArrival;
 use awaited::Awaited;
 pub use config::{AccessLine, NetworkConfig, NetworkError};
 use groups::Group;
@@ -436,7 +438,7 @@ impl<P: Clone> Network<P> {
     /// first break of `take`, and returns its value. `None` says nothing about further events: call [`Network::poll_event`] then. The call is inlined, so unused
     /// parts of an event need not be computed.
     #[inline(always)]
-    pub fn take_mere_arrivals<T>(&mut self, mut take: impl FnMut(PacketEvent<P, Path>) -> ControlFlow<T>) -> Option<T> {
+    pub fn take_mere_arrivals<T: TakeArrival<P>>(&mut self, mut take: T) -> Option<T::Break> {
         if self.has_inner_events || !self.traffic.happened.is_empty() {
             return None;
         }
@@ -532,12 +534,12 @@ fn nodes_of_all(config: &NetworkConfig) -> u16 {
 /// Hands over the packets of a group, which have arrived at one instant, until `take` breaks. Not inlined, so that the loop over single packets has the registers
 /// for itself (`benches/peers`, datagrams all the time).
 #[inline(never)]
-fn arrive_together<P: Clone, T>(
+fn arrive_together<P: Clone, T: TakeArrival<P>>(
     group: Group<P>,
     traffic: &mut Traffic<P>,
     lines: &mut Lines<P>,
-    take: &mut impl FnMut(PacketEvent<P, Path>) -> ControlFlow<T>,
-) -> ControlFlow<T> {
+    take: &mut T,
+) -> ControlFlow<T::Break> {
     // Kept in registers, and written back only for a break.
     let Group { at, offered, sequence, from, next: NodeId(mut to), end, first, size, payload } = group;
     while to < end {
@@ -557,17 +559,17 @@ fn arrive_together<P: Clone, T>(
 /// Hands over a packet that has arrived at `at`. Without inner events, no engine is woken, no packet has passed another line before its link, and no packet is
 /// damaged.
 #[inline(always)]
-fn arrive<P: Clone, T>(
+fn arrive<P: Clone, T: TakeArrival<P>>(
     packet: InNetwork<P>,
     link: LinkId,
     at: Instant,
     lines: &mut Lines<P>,
-    take: &mut impl FnMut(PacketEvent<P, Path>) -> ControlFlow<T>,
-) -> ControlFlow<T> {
+    take: &mut T,
+) -> ControlFlow<T::Break> {
     let line = lines.link_mut(link);
     if packet.size.has(SizeAndMarks::TRAIN) {
         line.deliver_further(packet.size.further_packets(), packet.entered, at);
     }
     line.deliver(packet.entered, at);
-    take(packet.event(LineId::Link(link), at, Fate::Delivered(at), None))
+    take.take(packet.event(LineId::Link(link), at, Fate::Delivered(at), None))
 }
