@@ -14,7 +14,7 @@
 //! only once, while a heap would sift every event. Neither the bucket of an event nor the form of the queue changes the order of events: the order depends on
 //! the keys alone.
 //!
-//! In the calendar an event stays in its [store](Store). Buckets sort one word per event: the time since the beginning of the bucket, and the place in the
+//! In the calendar an event stays in its [store](Store). Buckets sort one word per event: the lower bits of the instant, and the place in the
 //! store. The store of an [`EventQueue`] is a slab of events. A network has a store that keeps what the packets of a broadcast have in common only once.
 //!
 //! The width of the buckets adapts to the events, so a bucket holds 4 to 16 events on average. With fewer events per bucket, searches for the next bucket
@@ -23,6 +23,7 @@
 //! A short calendar has no buckets: all events lie in the front, and a new event is inserted there. With few events in all, a bucket holds hardly
 //! any, and finding and emptying the bucket takes longer than the insertion.
 
+mod bucket;
 mod front;
 pub(crate) mod slab;
 #[cfg(test)]
@@ -31,9 +32,11 @@ mod tests;
 use alloc::collections::BinaryHeap;
 use alloc::vec::Vec;
 use core::cmp::Reverse;
+use core::ops::ControlFlow;
 
 use cohaptic_units::Instant;
 
+use bucket::{FEW, PLACE_BITS, Packed, has_ties, pack, sort_few, unpack};
 use front::Front;
 use slab::Slab;
 
@@ -152,15 +155,9 @@ pub(crate) struct Queue<E, S> {
 /// Event outside `ring`: its instant, and its place in the store.
 type Entry = (Instant, Place);
 
-/// Event in a bucket. The lower [`PLACE_BITS`] bits are the place in the store, the upper bits the time since the beginning of the bucket \[ns\].
-type Packed = u64;
-
-/// Number of bits of a place.
-const PLACE_BITS: u32 = 42;
-
 /// Number of slots, a power of two. With the widths below, the slots span 134 ms to 34 s.
 const RING: usize = 8192;
-/// Allowed exponents of the width. At most 64 − [`PLACE_BITS`], so a time within a bucket and a place fit into a word.
+/// Allowed exponents of the width. At most 64 − [`PLACE_BITS`], so an instant within a bucket and a place fit into a word.
 const WIDTHS: core::ops::RangeInclusive<u32> = 14..=22;
 /// Initial exponent of the width: buckets of 131 µs.
 const FIRST_WIDTH: u32 = 17;
@@ -267,6 +264,37 @@ impl<E: Event, S: Store<E>> Queue<E, S> {
         Some(take(event))
     }
 
+    /// Removes the first events of a calendar with instants of at most `now`, and gives each event to `take`, until `take` breaks. Ends at the latest after the
+    /// events of a bucket: `None` says nothing about further events.
+    #[inline(always)]
+    pub(crate) fn take_some_due<T>(&mut self, now: Instant, mut take: impl FnMut(E) -> ControlFlow<T>) -> Option<T> {
+        let Self { front, store, .. } = self;
+        let (mut taken, mut ended) = (0, None);
+        for &(at, place) in front.entries().iter().take_while(|entry| entry.0 <= now) {
+            taken += 1;
+            if let Some(event) = store.take(at, place)
+                && let ControlFlow::Break(value) = take(event)
+            {
+                ended = Some(value);
+                break;
+            }
+        }
+        // Counted once for all events, because `take` cannot see the queue.
+        if taken > 0 {
+            front.drop_first(taken);
+            self.len -= taken;
+            // An empty calendar becomes a ring again.
+            self.in_order = self.len == 0;
+        }
+        ended
+    }
+
+    /// Returns whether the queue is a ring.
+    #[inline(always)]
+    pub(crate) const fn is_in_order(&self) -> bool {
+        self.in_order
+    }
+
     /// Returns the key of the first event if its instant is at most `now`.
     #[inline]
     pub(crate) fn due_key(&mut self, now: Instant) -> Option<E::Key> {
@@ -281,7 +309,7 @@ impl<E: Event, S: Store<E>> Queue<E, S> {
 
     /// Returns whether the front of the calendar begins with an event that is due at `now`, after a search for the next bucket if the front is empty.
     #[inline(always)]
-    fn is_due(&mut self, now: Instant) -> bool {
+    pub(crate) fn is_due(&mut self, now: Instant) -> bool {
         match self.front.first() {
             Some(first) => first.0 <= now,
             None => self.advance(now),
@@ -311,7 +339,7 @@ impl<E: Event, S: Store<E>> Queue<E, S> {
             return self.far.peek().map(|Reverse(first)| first.0);
         };
         // A bucket is unsorted until its time comes, so its minimum is searched.
-        self.ring[slot(bucket)].iter().min().map(|first| self.unpack(bucket, *first).0)
+        self.ring[slot(bucket)].iter().min().map(|first| unpack(bucket << self.width, *first).0)
     }
 
     /// Turns the ring into a calendar, which is short at first, and moves all events of `ordered` there.
@@ -355,8 +383,13 @@ impl<E: Event, S: Store<E>> Queue<E, S> {
         if self.is_short || beyond_next >= RING as u64 - 1 {
             return self.push_elsewhere(bucket, entry);
         }
-        self.quiet_until = self.quiet_until.min(entry.0);
-        self.push_ring(bucket, entry);
+        let packed = pack(entry);
+        let events = &mut self.ring[slot(bucket)];
+        // An empty bucket has no memory, so one test finds both empty and full buckets.
+        if events.len() == events.capacity() {
+            return self.push_without_room(bucket, packed);
+        }
+        events.push(packed);
     }
 
     /// Puts an event into the front or beyond the buckets. Not inlined, so that a push into a bucket stays small.
@@ -379,16 +412,6 @@ impl<E: Event, S: Store<E>> Queue<E, S> {
     /// Returns the number of the bucket of an instant.
     fn bucket_of(&self, at: Instant) -> u64 {
         at.as_nanos() >> self.width
-    }
-
-    /// Packs an entry into the word of its bucket.
-    fn pack(&self, (at, place): Entry) -> Packed {
-        (at.as_nanos() & ((1 << self.width) - 1)) << PLACE_BITS | place
-    }
-
-    /// Returns the entry of a word in the bucket with the number `bucket`.
-    fn unpack(&self, bucket: u64, packed: Packed) -> Entry {
-        unpack(self.width, bucket, packed)
     }
 
     /// Brings the next bucket to the front if the front is empty and the bucket has begun at `now`. Returns whether the front begins with a due event.
@@ -419,26 +442,30 @@ impl<E: Event, S: Store<E>> Queue<E, S> {
         self.occupied[place / 64] &= !(1 << (place % 64));
         let mut events = core::mem::take(&mut self.ring[place]);
         self.brought = (self.brought.0 + 1, self.brought.1 + events.len() as u64);
-        let mut few = [0; FEW];
-        let is_tie = |pair: &[Packed]| pair[0] >> PLACE_BITS == pair[1] >> PLACE_BITS;
-        let key = |packed: &Packed| {
-            let (at, place) = self.unpack(bucket, *packed);
-            self.store.key(at, place)
-        };
-        let sorted = if events.windows(2).any(is_tie) {
-            // Events of one instant, such as a flight of segments, are pushed in few ascending runs of keys. A stable sort merges the runs.
-            events.sort_by_key(key);
-            &mut events
+        let begin = bucket << self.width;
+        let Self { front, store, .. } = self;
+        let key = |entry: &Entry| store.key(entry.0, entry.1);
+        if events.len() <= FEW {
+            let sorted = front.refill(sort_few(&events, &mut [0; FEW]).iter().map(|packed| unpack(begin, *packed)));
+            // Keys are read from the store only for two equal instants.
+            if has_ties(sorted) {
+                sorted.sort_by_key(key);
+            }
         } else {
-            let sorted = sort(&mut events, &mut few);
-            if sorted.windows(2).any(is_tie) {
-                // Words sort by instant and then by place. Keys are read from the store only for two equal instants.
+            let is_tie = |pair: &[Packed]| pair[0] >> PLACE_BITS == pair[1] >> PLACE_BITS;
+            // Events of one instant, such as a flight of segments, are pushed in few ascending runs of keys. A stable sort merges the runs.
+            let are_flights = events.windows(2).any(is_tie);
+            if !are_flights {
+                events.sort_unstable();
+            }
+            let sorted = front.refill(events.iter().map(|packed| unpack(begin, *packed)));
+            if are_flights {
+                sorted.sort_by_key(key);
+            } else if has_ties(sorted) {
+                // Words sort by instant and then by place.
                 sorted.sort_unstable_by_key(key);
             }
-            sorted
-        };
-        let width = self.width;
-        self.front.extend(sorted.iter().map(|packed| unpack(width, bucket, *packed)));
+        }
         // Buckets without any event so far have no memory to keep.
         events.clear();
         if events.capacity() > 0 {
@@ -470,7 +497,7 @@ impl<E: Event, S: Store<E>> Queue<E, S> {
             let place = slot(bucket);
             self.occupied[place / 64] &= !(1 << (place % 64));
             let events = core::mem::take(&mut self.ring[place]);
-            entries.extend(events.iter().map(|packed| self.unpack(bucket, *packed)));
+            entries.extend(events.iter().map(|packed| unpack(bucket << self.width, *packed)));
         }
         entries.extend(core::mem::take(&mut self.far).into_iter().map(|Reverse(entry)| entry));
         self.width = width;
@@ -501,25 +528,19 @@ impl<E: Event, S: Store<E>> Queue<E, S> {
         front.insert(entry, |other| other.0 < entry.0 || other.0 == entry.0 && are_in_order(store, *other, entry));
     }
 
-    #[inline(always)]
-    fn push_ring(&mut self, bucket: u64, entry: Entry) {
-        let packed = self.pack(entry);
+    /// Puts an event into a bucket without room. Marks the slot of an empty bucket, and reuses the memory of an emptied bucket. Not inlined, so that a push
+    /// into a bucket stays small.
+    #[inline(never)]
+    fn push_without_room(&mut self, bucket: u64, packed: Packed) {
         let place = slot(bucket);
         let events = &mut self.ring[place];
         if events.is_empty() {
-            return self.begin_bucket(place, packed);
-        }
-        events.push(packed);
-    }
-
-    /// Puts the first event into the bucket of the slot `place`: marks the slot, and reuses the memory of an emptied bucket. Not inlined, so that a push into a
-    /// bucket stays small.
-    #[inline(never)]
-    fn begin_bucket(&mut self, place: usize, packed: Packed) {
-        self.occupied[place / 64] |= 1 << (place % 64);
-        let events = &mut self.ring[place];
-        if let Some(spare) = self.spare.pop() {
-            *events = spare;
+            self.occupied[place / 64] |= 1 << (place % 64);
+            // Later events of the bucket may lie before this event, but not before the bucket.
+            self.quiet_until = self.quiet_until.min(Instant::from_nanos(bucket << self.width));
+            if let Some(spare) = self.spare.pop() {
+                *events = spare;
+            }
         }
         events.push(packed);
     }
@@ -554,32 +575,9 @@ fn slot(bucket: u64) -> usize {
     (bucket & (RING as u64 - 1)) as usize
 }
 
-/// Returns the entry of a word in the bucket with the number `bucket`, if buckets span 2^`width` ns.
-fn unpack(width: u32, bucket: u64, packed: Packed) -> Entry {
-    (Instant::from_nanos((bucket << width) + (packed >> PLACE_BITS)), packed & ((1 << PLACE_BITS) - 1))
-}
-
 /// Returns whether the key of the event `first` is at most the key of the event `second`. Not inlined, because the comparison of two keys is longer than
 /// everything around it, and rare.
 #[inline(never)]
 fn are_in_order<E: Event>(store: &impl Store<E>, first: Entry, second: Entry) -> bool {
     store.key(first.0, first.1) <= store.key(second.0, second.1)
 }
-
-/// Sorts distinct words. At most [`FEW`] words are sorted into `few` by counting: the number of smaller words is the index of a word. No branch then depends on
-/// the order of the words. A processor cannot predict this order.
-fn sort<'a>(words: &'a mut [Packed], few: &'a mut [Packed; FEW]) -> &'a mut [Packed] {
-    if words.len() > FEW {
-        words.sort_unstable();
-        return words;
-    }
-    for word in &*words {
-        // Words are distinct, because each has a different place in the store, so no two ranks are equal.
-        let rank: usize = words.iter().map(|other| usize::from(other < word)).sum();
-        few[rank] = *word;
-    }
-    &mut few[..words.len()]
-}
-
-/// Largest number of words sorted by counting.
-const FEW: usize = 24;

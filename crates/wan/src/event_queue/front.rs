@@ -37,6 +37,22 @@ impl Front {
         Some(first)
     }
 
+    /// Returns all entries, in order.
+    #[inline(always)]
+    pub(super) fn entries(&self) -> &[Entry] {
+        &self.places[self.removed..]
+    }
+
+    /// Removes the first `count` entries, of at least as many.
+    #[inline(always)]
+    pub(super) fn drop_first(&mut self, count: usize) {
+        self.removed += count;
+        if self.removed >= self.places.len() {
+            self.places.clear();
+            self.removed = 0;
+        }
+    }
+
     /// Inserts an entry after the entries that precede the entry: a beginning of all entries.
     pub(super) fn insert(&mut self, entry: Entry, precedes: impl Fn(&Entry) -> bool) {
         // The memory of removed entries is used again once they are the larger part, so that an entry is moved once on average.
@@ -59,9 +75,10 @@ impl Front {
         self.places[place] = entry;
     }
 
-    /// Appends entries that come after all entries, in order.
-    pub(super) fn extend(&mut self, entries: impl Iterator<Item = Entry>) {
+    /// Fills an empty front. The caller puts the entries in order.
+    pub(super) fn refill(&mut self, entries: impl Iterator<Item = Entry>) -> &mut [Entry] {
         self.places.extend(entries);
+        &mut self.places
     }
 
     /// Returns all entries, in order.

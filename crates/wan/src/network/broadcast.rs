@@ -17,10 +17,10 @@ use crate::line::pipeline::Outcome;
 use crate::packet::PacketInfo;
 
 /// Number of links to which a packet of a broadcast is offered before the arrivals are scheduled.
-const OFFERED_AT_ONCE: u16 = 8;
+const OFFERED_AT_ONCE: usize = 8;
 
 /// Arrivals of the packets that are offered together, or [`Instant::ZERO`] for a link without a later arrival.
-type Arrivals = [Instant; OFFERED_AT_ONCE as usize];
+type Arrivals = [Instant; OFFERED_AT_ONCE];
 
 /// Links from one node to all nodes, in the order of receivers.
 type Row<P> = [Line<P, InNetwork<P>>];
@@ -159,68 +159,57 @@ fn schedule_group<P: Clone>(traffic: &mut Traffic<P>, sent: &Sent<'_, P>, first:
     traffic.schedule_group(Group { at, offered: now, sequence, from, next, end, first, size, payload: payload.clone() });
 }
 
-/// Like [`schedule_groups`], for links of which some draw random numbers, so that each packet arrives at an instant of its own.
+/// Like [`schedule_groups`], for links of which some draw random numbers, so that each packet arrives at an instant of its own. The first packet with another
+/// number than the packets before also counts as a packet with another fate: numbers differ only if single packets are sent between broadcasts.
 #[inline(never)]
-fn schedule_each<P: Clone>(row: &mut Row<P>, first: LinkId, traffic: &mut Traffic<P>, sent: &Sent<'_, P>, mut begin: u16) -> Option<Unusual> {
-    let receiver = if begin == sent.from.0 { begin + 1 } else { begin };
-    let mut open = traffic.open(sent, first, row.get(usize::from(receiver))?.offered());
+fn schedule_each<P: Clone>(row: &mut Row<P>, first: LinkId, traffic: &mut Traffic<P>, sent: &Sent<'_, P>, begin: u16) -> Option<Unusual> {
+    let (begin, own) = (usize::from(begin), usize::from(sent.from.0));
+    let receiver = if begin == own { begin + 1 } else { begin };
+    let mut open = traffic.open(sent, first, row.get(receiver)?.offered());
     let mut unusual = None;
-    for lines in row[usize::from(begin)..].chunks_mut(usize::from(OFFERED_AT_ONCE)) {
-        let mut arrivals = [Instant::ZERO; OFFERED_AT_ONCE as usize];
-        unusual = offer_to_some(lines, sent, begin, &mut arrivals);
-        schedule_arrivals(lines, &arrivals, begin, (sent, first), traffic, &mut open);
-        if unusual.is_some() {
-            break;
+    // Receivers before the sender, and receivers after the sender.
+    'parts: for part in [begin.min(own)..own, begin.max(own + 1)..row.len()] {
+        for (lines, begin) in row[part.clone()].chunks_mut(OFFERED_AT_ONCE).zip(part.step_by(OFFERED_AT_ONCE)) {
+            let mut arrivals = [Instant::ZERO; OFFERED_AT_ONCE];
+            let ended = offer_to_some(lines, sent.now, open.sequence, &mut arrivals);
+            schedule_arrivals(&arrivals[..lines.len()], sent.now, NodeId::new(begin), traffic, &mut open);
+            if let Some((index, sequence, outcome)) = ended {
+                unusual = Some(Unusual { to: NodeId::new(begin + index), sequence, outcome });
+                break 'parts;
+            }
         }
-        begin += OFFERED_AT_ONCE;
     }
     traffic.close(&open);
     unusual
 }
 
-/// Schedules the arrivals that come later than the packet, indexed like the links to the receivers from `begin` on. Not inlined, so that the loops over offers
-/// and over arrivals have all registers each (`benches/peers`, rows of watched packets).
+/// Schedules the arrivals later than `now` at successive receivers, of which `begin` is the first. Not inlined, so that the loops over offers and over
+/// arrivals have all registers each (`benches/peers`, rows of watched packets).
 #[inline(never)]
-fn schedule_arrivals<P: Clone>(
-    lines: &Row<P>,
-    arrivals: &Arrivals,
-    begin: u16,
-    (sent, first): (&Sent<'_, P>, LinkId),
-    traffic: &mut Traffic<P>,
-    open: &mut Open,
-) {
-    for ((line, at), to) in lines.iter().zip(arrivals).zip((begin..).map(NodeId)).filter(|((_, at), _)| **at > sent.now) {
-        // The latest packet of the link was offered just now.
-        let sequence = line.offered() - 1;
-        // Numbers differ only if single packets are sent between broadcasts.
-        if sequence != open.sequence {
-            traffic.close(open);
-            *open = traffic.open(sent, first, sequence);
+fn schedule_arrivals<P: Clone>(arrivals: &[Instant], now: Instant, begin: NodeId, traffic: &mut Traffic<P>, open: &mut Open) {
+    for (at, to) in arrivals.iter().zip(begin.0..) {
+        if *at > now {
+            traffic.schedule_shared(*at, NodeId(to), open);
         }
-        traffic.schedule_shared(*at, to, open);
     }
 }
 
-/// Offers a packet to each of at most [`OFFERED_AT_ONCE`] links to the receivers from `begin` on, up to the first packet that does not arrive later. Sets the
-/// later arrivals, indexed like the links, and returns the packet that ended the offers.
+/// Offers a packet to each of at most [`OFFERED_AT_ONCE`] links, up to the first packet that does not arrive later than `now`, or has another number than
+/// `expected`. Sets the later arrivals, indexed like the links, and returns index, number and outcome of the packet that ended the offers.
 ///
 /// Draws and offers are two loops, because one loop for both needs more registers than there are (`benches/peers`, rows of watched packets).
 #[inline(always)]
-fn offer_to_some<P: Clone>(lines: &mut Row<P>, sent: &Sent<'_, P>, begin: u16, arrivals: &mut Arrivals) -> Option<Unusual> {
-    // The draws do not depend on each other, so a processor can compute several at once. The link from the node to itself has words as well, so words and links
-    // stay in step.
-    let mut words = [[0; 2]; OFFERED_AT_ONCE as usize];
+fn offer_to_some<P: Clone>(lines: &mut Row<P>, now: Instant, expected: u64, arrivals: &mut Arrivals) -> Option<(usize, u64, Outcome)> {
+    // The draws do not depend on each other, so a processor can compute several at once.
+    let mut words = [[0; 2]; OFFERED_AT_ONCE];
     for (words, line) in words.iter_mut().zip(&*lines) {
         *words = line.words();
     }
-    for (((line, words), arrival), to) in lines.iter_mut().zip(&words).zip(arrivals).zip((begin..).map(NodeId)) {
-        if to == sent.from {
-            continue;
-        }
+    for (index, ((line, words), arrival)) in lines.iter_mut().zip(&words).zip(arrivals).enumerate() {
         let sequence = line.offered();
-        match line.offer(sent.now, Some(*words)) {
-            Outcome::Arrives(at) if at > sent.now => *arrival = at,
-            outcome @ (Outcome::Arrives(_) | Outcome::Dropped(_) | Outcome::Enters) => return Some(Unusual { to, sequence, outcome }),
+        match line.offer(now, Some(*words)) {
+            Outcome::Arrives(at) if at > now && sequence == expected => *arrival = at,
+            outcome @ (Outcome::Arrives(_) | Outcome::Dropped(_) | Outcome::Enters) => return Some((index, sequence, outcome)),
         }
     }
     None

@@ -446,7 +446,12 @@ impl<P: Clone> Network<P> {
         // An arrival drops no packet, so one instant holds for all arrivals.
         let until = traffic.until(*now);
         loop {
-            let ended = if let Some(group) = traffic.pop_group(until) {
+            let ended = if traffic.has_only_singles(until) {
+                if !traffic.has_singles_due(until) {
+                    return None;
+                }
+                arrive_one_by_one(until, traffic, lines, &mut take)
+            } else if let Some(group) = traffic.pop_group(until) {
                 arrive_together(group, traffic, lines, &mut take)
             } else {
                 let Pending { at, sequence, offered, entered, turn, path, size, payload } = traffic.pop_until(until)?;
@@ -556,16 +561,26 @@ fn arrive_together<P: Clone, T: TakeArrival<P>>(
     ControlFlow::Continue(())
 }
 
-/// Hands over a packet that has arrived at `at`. Without inner events, no engine is woken, no packet has passed another line before its link, and no packet is
-/// damaged.
-#[inline(always)]
-fn arrive<P: Clone, T: TakeArrival<P>>(
-    packet: InNetwork<P>,
-    link: LinkId,
-    at: Instant,
+/// Hands over packets that [are due](Traffic::has_singles_due), in one loop, until `take` breaks.
+#[inline(never)]
+fn arrive_one_by_one<P: Clone, T: TakeArrival<P>>(
+    until: Instant,
+    traffic: &mut Traffic<P>,
     lines: &mut Lines<P>,
     take: &mut T,
 ) -> ControlFlow<T::Break> {
+    let ended = traffic.take_some(until, |pending| {
+        let Pending { at, sequence, offered, entered, turn, path, size, payload } = pending;
+        let Some(payload) = payload else { return ControlFlow::Continue(()) };
+        arrive(InNetwork { sequence, offered, entered, path, size, payload }, turn.link(), at, lines, take)
+    });
+    ended.map_or(ControlFlow::Continue(()), ControlFlow::Break)
+}
+
+/// Hands over a packet that has arrived at `at`. Without inner events, no engine is woken, no packet has passed another line before its link, and no packet is
+/// damaged.
+#[inline(always)]
+fn arrive<P: Clone, T: TakeArrival<P>>(packet: InNetwork<P>, link: LinkId, at: Instant, lines: &mut Lines<P>, take: &mut T) -> ControlFlow<T::Break> {
     let line = lines.link_mut(link);
     if packet.size.has(SizeAndMarks::TRAIN) {
         line.deliver_further(packet.size.further_packets(), packet.entered, at);

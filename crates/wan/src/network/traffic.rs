@@ -2,6 +2,7 @@
 
 use alloc::boxed::Box;
 use alloc::collections::{BTreeMap, VecDeque};
+use core::ops::ControlFlow;
 
 use cohaptic_units::Instant;
 
@@ -91,6 +92,25 @@ impl<P: Clone> Traffic<P> {
     pub(super) fn pop_group(&mut self, until: Instant) -> Option<Group<P>> {
         let is_due = self.groups.next_at().is_some_and(|at| at <= until);
         if is_due && (self.pending.len() == 0 || self.pending.due_key(until).is_none()) { self.groups.take_group() } else { None }
+    }
+
+    /// Returns whether no group is due at `until`, an instant from [`Traffic::until`], and the queue is a calendar, so that due events can be taken by
+    /// [`Traffic::take_some`].
+    #[inline(always)]
+    pub(super) fn has_only_singles(&self, until: Instant) -> bool {
+        !self.pending.is_in_order() && self.groups.next_at().is_none_or(|at| at > until)
+    }
+
+    /// Returns whether events are due at `until`, if [only single events](Traffic::has_only_singles) can be due.
+    #[inline(always)]
+    pub(super) fn has_singles_due(&mut self, until: Instant) -> bool {
+        self.pending.is_due(until)
+    }
+
+    /// Takes events that [are due](Traffic::has_singles_due): see [`Queue::take_some_due`].
+    #[inline(always)]
+    pub(super) fn take_some<T>(&mut self, until: Instant, take: impl FnMut(Pending<P>) -> ControlFlow<T>) -> Option<T> {
+        self.pending.take_some_due(until, take)
     }
 
     /// Puts back the rest of a group from [`Traffic::pop_group`].

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use cohaptic_tests_common::properties;
 use cohaptic_units::{Bytes, Instant, Probability};
-use cohaptic_wan::{Delay, LinkConfig, Loss, NodeId};
+use cohaptic_wan::{Delay, LinkConfig, Loss, NodeId, PacketEvent};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -21,12 +21,13 @@ properties! {
     #![proptest_config(cases(300))]
 
     /// Arrivals come in the same order and at the same instants, whether polled as mere arrivals, as far as the network gives those, or as events. A network
-    /// that says that it has no events has none.
+    /// that says that it has no events has none. The driver breaks after every event, or after a few.
     #[test]
     fn mere_arrivals_are_the_events_of_their_packets(
         plan in prop_oneof![3 => direct(), 1 => plan(3, 0.5)],
         script in sendings(3),
         general: bool,
+        at_once in 1..4_usize,
     ) {
         let (mut plain, mut subject) = (plan.build(general), plan.build(general));
         let mut now = Instant::ZERO;
@@ -42,9 +43,11 @@ properties! {
             }
             let mut found = Vec::new();
             loop {
-                while let Some(event) = subject.take_mere_arrivals(ControlFlow::Break) {
+                let mut take = |event: PacketEvent<_, _>| {
                     found.push(event);
-                }
+                    if found.len().is_multiple_of(at_once) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                };
+                while subject.take_mere_arrivals(&mut take).is_some() {}
                 let Some(event) = subject.poll_event() else { break };
                 found.push(event);
             }
