@@ -8,14 +8,19 @@
 //! ```
 //!
 //! the last addition rounds to u·|x⁺| and u·|v⁺|, and the products and their sum to at most 2u·(|e01·v| + |g0·f|) and 2u·(|e11·v| + |g1·f|). The references are
-//! computed with 31 digits, at whole numbers of ticks.
+//! computed with 31 digits, at whole numbers of ticks. By day an hour is a quarter of one.
 
 use cohaptic_harness::{Model, Simulation, TickRow};
-use cohaptic_tests::{Draft, DraftHand};
+use cohaptic_tests::{Draft, DraftHand, quarter_by_day};
 use qd::Quad;
 
 use crate::hard::ROUNDING;
 use crate::hard::watch::OnTick;
+
+/// Ticks of an hour at 1 kHz, and by day of a quarter of an hour.
+fn hour() -> u64 {
+    quarter_by_day(3_600_000)
+}
 
 /// The time of tick `k` of `tick` µs, exactly \[s\].
 fn seconds(k: u64, tick: u64) -> Quad {
@@ -60,7 +65,7 @@ fn copies_move_on(tick: u64, ticks: u64) {
 
 #[test]
 fn copies_that_move_as_one_move_uniformly_for_an_hour_at_a_kilohertz() {
-    copies_move_on(1000, 3_600_000);
+    copies_move_on(1000, hour());
 }
 
 #[test]
@@ -108,7 +113,7 @@ fn a_device_is_pushed(tick: u64, ticks: u64) {
 
 #[test]
 fn a_device_under_a_constant_force_follows_the_parabola_for_an_hour_at_a_kilohertz() {
-    a_device_is_pushed(1000, 3_600_000);
+    a_device_is_pushed(1000, hour());
 }
 
 #[test]
@@ -125,7 +130,7 @@ fn a_device_under_a_constant_force_follows_the_parabola_for_a_day_at_coarse_tick
 /// of the velocity, of which e^(−h/τ) stays to the next; and e01 times that error and 12u·(|e01·v| + |g0·f|) + u·|x⁺| to that of the position.
 #[test]
 fn a_damped_device_keeps_its_terminal_velocity_for_an_hour() {
-    let (tick, ticks) = (1000, 3_600_000);
+    let (tick, ticks) = (1000, hour());
     let mut draft = alone(tick, ticks);
     let (x0, v0, f, m, b, h) = (0.0, -0.5, 0.25, 0.1, 5.0, 1e-3);
     let peer = &mut draft.peers[0];
@@ -169,7 +174,7 @@ fn a_damped_device_keeps_its_terminal_velocity_for_an_hour() {
 /// those forces does. The sums in this test are taken with 31 digits.
 #[test]
 fn an_hour_of_average_position_forces_moves_no_centre_of_mass() {
-    let mut draft = Draft { duration: 3_600_000, mass: 0.45, ..Draft::calm(3) };
+    let mut draft = Draft { duration: hour(), mass: 0.45, ..Draft::calm(3) };
     let starts = [([0.02, 0.3]), ([-0.01, -0.1]), ([0.015, -0.17])];
     for (peer, [x, v]) in draft.peers.iter_mut().zip(starts) {
         (peer.position, peer.velocity) = (Some([x, 0.0, 0.0]), Some([v, 0.0, 0.0]));
@@ -196,5 +201,5 @@ fn an_hour_of_average_position_forces_moves_no_centre_of_mass() {
         wrong_v += forces + 3.0 * ROUNDING * reached.1;
         (position, velocity, largest, k) = (Quad::ZERO, Quad::ZERO, (0.0, 0.0), k + 1);
     }));
-    assert_eq!(k, 3_600_000);
+    assert_eq!(k, hour());
 }

@@ -1,18 +1,23 @@
 //! An hour at 1 kHz and a day at coarse ticks: time does not drift, whatever the clocks.
 //!
 //! A tick, a departure and an arrival are whole nanoseconds that follow from their number by a formula. So the tolerance is none. Only a hand that is a sine is a
-//! real function of time; how far its phase may be off follows from the roundings in 2π·f·t.
+//! real function of time; how far its phase may be off follows from the roundings in 2π·f·t. By day an hour of ticks is a quarter of one.
 
 use std::time::Duration;
 
 use cohaptic_harness::{Model, NoObserver, Simulation};
 use cohaptic_peer::Signal;
-use cohaptic_tests::{Draft, DraftPeer};
+use cohaptic_tests::{Draft, DraftPeer, quarter_by_day};
 use cohaptic_units::{Hertz, Instant};
 use cohaptic_wan::Fate;
 
 use crate::hard::ROUNDING;
 use crate::hard::watch::{OnPacket, OnTick};
+
+/// Seconds of an hour, and by day of a quarter of an hour.
+fn hour() -> u64 {
+    quarter_by_day(3600)
+}
 
 /// Peers that tick every `tick` µs by clocks of that offset \[ns\] and drift [parts per 10⁹], for `seconds`, with a sample every 1000 ticks.
 fn scene(tick: u64, seconds: u64, clocks: &[(u64, i32)]) -> Draft {
@@ -53,12 +58,12 @@ fn ticks_are_on_time(draft: &Draft) {
 
 #[test]
 fn an_hour_of_ticks_at_a_kilohertz_is_on_the_nanosecond() {
-    ticks_are_on_time(&scene(1000, 3600, &[(0, 0), (300_000, 20_000), (999_999, -123_457)]));
+    ticks_are_on_time(&scene(1000, hour(), &[(0, 0), (300_000, 20_000), (999_999, -123_457)]));
 }
 
 #[test]
 fn an_hour_of_clocks_ten_percent_off_is_on_the_nanosecond() {
-    ticks_are_on_time(&scene(1000, 3600, &[(1, 100_000_000), (0, -100_000_000)]));
+    ticks_are_on_time(&scene(1000, hour(), &[(1, 100_000_000), (0, -100_000_000)]));
 }
 
 #[test]
@@ -70,7 +75,7 @@ fn a_day_at_coarse_ticks_is_on_the_nanosecond() {
 /// An hour without an event queue: tick k at k ms, packet n of each link sent at 8·n ms and there 24 ms later.
 #[test]
 fn an_hour_in_lockstep_sends_and_arrives_on_the_nanosecond() {
-    let draft = Draft { update: 8000, ..scene(1000, 3600, &[(0, 0); 3]) };
+    let draft = Draft { update: 8000, ..scene(1000, hour(), &[(0, 0); 3]) };
     let mut arrived = [0_u64; 9];
     let mut ticks = [0_u64; 3];
     let summary = Simulation::new(&draft.scene(), Model::Least).run(&mut (
@@ -86,18 +91,19 @@ fn an_hour_in_lockstep_sends_and_arrives_on_the_nanosecond() {
         }),
     ));
     let Ok(summary) = summary;
-    assert_eq!((ticks, summary.ticks), ([3_600_000; 3], 3_600_000));
-    // Sent at 0, 8, … 3 599 992 ms; the last that is there by the end left 24 ms before it.
+    let (all, offered) = (1000 * hour(), 125 * hour());
+    assert_eq!((ticks, summary.ticks), ([all; 3], all));
+    // Sent at 0, 8, … ms, the last one 8 ms before the end; the last that is there by the end left 24 ms before it.
     for link in &summary.links {
-        assert_eq!((link.stats.offered(), link.stats.delivered(), link.stats.in_flight()), (450_000, 449_998, 2));
-        assert_eq!((arrived[3 * link.from + link.to], link.stats.mean_delay()), (449_998, Some(Duration::from_millis(24))));
+        assert_eq!((link.stats.offered(), link.stats.delivered(), link.stats.in_flight()), (offered, offered - 2, 2));
+        assert_eq!((arrived[3 * link.from + link.to], link.stats.mean_delay()), (offered - 2, Some(Duration::from_millis(24))));
     }
 }
 
 /// The same hour by an event queue, with nobody looking: the loop counts as it does in lockstep.
 #[test]
 fn an_hour_by_either_model_ends_in_the_same_state() {
-    let mut draft = scene(1000, 3600, &[(0, 0), (0, 0)]);
+    let mut draft = scene(1000, hour(), &[(0, 0), (0, 0)]);
     draft.velocity = [0.01, 0.0, 0.0];
     let scene = draft.scene();
     let [least, general] = [Model::Least, Model::General].map(|model| {

@@ -13,6 +13,30 @@ use proptest::test_runner::{TestCaseResult, TestRunner, contextualize_config};
 #[doc(hidden)]
 pub use proptest;
 
+/// The variable of the environment with which a property test draws all of its cases. `.ci/nightly` sets it. The library `cohaptic-tests` repeats this variable
+/// and its functions, because Cargo packages no library that depends on an unpublished one.
+pub const ALL_CASES_VARIABLE: &str = "COHAPTIC_TEST_ALL_CASES";
+
+/// Returns whether all cases are asked for, by [`ALL_CASES_VARIABLE`].
+#[must_use]
+pub fn are_all() -> bool {
+    std::env::var_os(ALL_CASES_VARIABLE).is_some()
+}
+
+/// Returns `all` draws, ticks, packets or milliseconds of a test if [`ALL_CASES_VARIABLE`] is set, and a quarter of them otherwise.
+#[must_use]
+pub fn quarter_by_day(all: u64) -> u64 {
+    if are_all() { all } else { all.div_ceil(4) }
+}
+
+/// Returns the configuration of a property test that leaves no files behind. The test draws `count` cases if [`ALL_CASES_VARIABLE`] is set, and the first
+/// quarter of these cases otherwise.
+#[must_use]
+pub fn cases(count: u32) -> ProptestConfig {
+    let cases = if are_all() { count } else { count.div_ceil(4) };
+    ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
+}
+
 /// Declares property tests in the form of `proptest!`.
 ///
 /// Arguments are `PATTERN in STRATEGY` or `NAME: TYPE`, at most twelve. `#![proptest_config(CONFIG)]` at the begin sets the configuration of all tests.
@@ -105,6 +129,13 @@ mod tests {
 
     fn cases(cases: u32) -> ProptestConfig {
         ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
+    }
+
+    #[test]
+    fn by_day_a_quarter_of_the_cases_is_drawn_and_never_none() {
+        let share = if crate::are_all() { 1 } else { 4 };
+        assert_eq!(crate::cases(400).cases, 400 / share);
+        assert_eq!(crate::cases(1).cases, 1);
     }
 
     properties! {

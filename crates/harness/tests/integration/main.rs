@@ -23,7 +23,7 @@ mod virtual_time;
 
 use proptest::prelude::ProptestConfig;
 
-/// Returns the configuration of a property test with `count` cases that leaves no files behind.
+/// Returns [`cohaptic_tests_common::cases`], with a short search for a smaller case: each case is a whole session.
 fn cases(count: u32) -> ProptestConfig {
-    ProptestConfig { cases: count, failure_persistence: None, max_shrink_iters: 200, ..ProptestConfig::default() }
+    ProptestConfig { max_shrink_iters: 200, ..cohaptic_tests_common::cases(count) }
 }

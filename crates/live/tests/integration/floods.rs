@@ -4,14 +4,13 @@ use std::net::SocketAddr;
 
 use cohaptic_live::client::{Joined, Joining};
 use cohaptic_live::{Admission, AdmissionControl, Place};
+use cohaptic_tests_common::quarter_by_day;
 use cohaptic_units::Instant;
 
 use crate::support::{SEAT, SESSION, address, admitted, assert_counts, at, joining, key, keyed_door, sample, sealed, shake_hands};
 
 /// Time between two hellos of a flood \[ns\]: 9,700 hellos a second.
 const EVERY: u64 = 1_000_000_000 / 9_700;
-/// Number of honest peers that join during a flood, one after another, at the seat that the flood asks for.
-const HONEST: u8 = 20;
 /// Time between the joinings of two honest peers \[ms\]. In this time the former peer becomes silent for longer than the session waits.
 const SPACING: u64 = 150;
 /// Number of samples that an honest peer sends, one sample every 8 ms.
@@ -48,6 +47,11 @@ impl Flood {
     }
 }
 
+/// Number of honest peers that join during a flood, one after another, at the seat that the flood asks for.
+fn honest_peers() -> u64 {
+    quarter_by_day(20)
+}
+
 fn honest_address(honest: u8) -> SocketAddr {
     address(7000 + u16::from(honest))
 }
@@ -79,13 +83,14 @@ fn came_in(flood: Flood) -> u8 {
     let mut present = Present::join(&mut door);
     let (mut honest, mut came_in, mut hellos) = (0, 0, 0);
     let mut joined: Option<(Joined, u64)> = None;
-    for tick in 0..u64::from(HONEST) * SPACING {
+    for tick in 0..honest_peers() * SPACING {
         let now = at(tick);
         // All hellos of the flood that are sent before this millisecond.
         while EVERY * hellos < now.as_nanos() {
             let (from, joining) = flood.hello(hellos, honest);
-            match door.handle_datagram(Instant::from_nanos(EVERY * hellos), from, &joining.hello()) {
-                Admission::Reply { to, bytes } => assert!(to == from && bytes.len() <= joining.hello().len(), "an answer amplifies nothing"),
+            let hello = joining.hello();
+            match door.handle_datagram(Instant::from_nanos(EVERY * hellos), from, &hello) {
+                Admission::Reply { to, bytes } => assert!(to == from && bytes.len() <= hello.len(), "an answer amplifies nothing"),
                 Admission::Refused(_) => {}
                 Admission::Sample { .. } => panic!("a hello is no sample"),
             }
@@ -117,6 +122,6 @@ fn came_in(flood: Flood) -> u8 {
 #[test]
 fn a_flood_of_hellos_keeps_nobody_out_and_throws_nobody_out() {
     for flood in [Flood::Recorded, Flood::FromFalseAddresses, Flood::OnThePath, Flood::OfAGuest] {
-        assert_eq!(came_in(flood), HONEST, "{flood:?}");
+        assert_eq!(u64::from(came_in(flood)), honest_peers(), "{flood:?}");
     }
 }

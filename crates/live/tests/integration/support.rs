@@ -6,8 +6,8 @@ use std::time::Duration;
 use cohaptic_live::client::{Joined, Joining};
 use cohaptic_live::{Admission, AdmissionConfig, AdmissionControl, Admitted, Entropy, EntropyError, MAX_DATAGRAM, Place, Refusal, Seat, SessionKey};
 use cohaptic_peer::{State, wire};
+pub(crate) use cohaptic_tests_common::cases;
 use cohaptic_units::Instant;
-use proptest::prelude::ProptestConfig;
 
 pub(crate) const SESSION: u64 = 42;
 /// Silence after which a peer counts as gone.
@@ -27,11 +27,6 @@ impl Entropy for Counting {
         }
         Ok(())
     }
-}
-
-/// Returns the configuration of a property test with `count` cases that leaves no files behind.
-pub(crate) fn cases(count: u32) -> ProptestConfig {
-    ProptestConfig { cases: count, failure_persistence: None, ..ProptestConfig::default() }
 }
 
 pub(crate) fn key() -> SessionKey {

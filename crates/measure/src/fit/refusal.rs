@@ -1,6 +1,6 @@
 //! Tests with delays that follow no law.
 
-use cohaptic_tests_common::properties;
+use cohaptic_tests_common::{cases, properties};
 use proptest::prelude::*;
 use rand_distr::{Distribution as _, Exp1, StandardNormal};
 
@@ -141,7 +141,7 @@ fn lists() -> impl Strategy<Value = Vec<f64>> {
 }
 
 properties! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(cases(48))]
 
     /// For any list of delays and any resolution of the clock, the mean and the deviation of the link lie within the standard errors of the sample, or the
     /// link has no law.

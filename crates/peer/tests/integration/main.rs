@@ -17,9 +17,4 @@ mod step_map;
 mod turning_energy;
 mod wire;
 
-use proptest::prelude::ProptestConfig;
-
-/// Returns the configuration of a property test with `cases` cases that leaves no files behind.
-fn cases(count: u32) -> ProptestConfig {
-    ProptestConfig { cases: count, failure_persistence: None, ..ProptestConfig::default() }
-}
+use cohaptic_tests_common::cases;

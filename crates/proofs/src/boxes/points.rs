@@ -130,9 +130,9 @@ fn judged(cases: &[Case]) -> (usize, usize) {
 
 #[test]
 fn no_box_holds_a_point_of_the_other_kind() {
-    let some: Vec<Case> = cases().into_iter().step_by(10).collect();
+    let some: Vec<Case> = cases().into_iter().step_by(20).collect();
     let (judged, points) = judged(&some);
-    assert!(points > 10_000 && judged > points / 2, "{judged} of {points}");
+    assert!(points > 5_000 && judged > points / 2, "{judged} of {points}");
 }
 
 #[test]

@@ -8,6 +8,7 @@
 
 use std::time::Duration;
 
+pub(crate) use cohaptic_tests_common::cases;
 use cohaptic_units::{Bytes, Instant, Probability, Rate};
 use cohaptic_wan::{
     AccessLine, Bottleneck, Delay, Distribution, Framing, GilbertElliott, Jitter, Link, LinkConfig, LinkName, Loss, Network, NetworkConfig, NodeId,
@@ -25,11 +26,6 @@ pub(crate) const SEED: u64 = 2015;
 /// Payload of a packet: its number among all offered packets, so that a payload in a wrong packet is noticed. All tests have this type, because each type of
 /// payload compiles all code of links and networks again.
 pub(crate) type Payload = u64;
-
-/// Proptest without files.
-pub(crate) fn cases(cases: u32) -> ProptestConfig {
-    ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
-}
 
 pub(crate) fn rate(bits_per_sec: u64) -> Rate {
     Rate::bits_per_sec(bits_per_sec).unwrap()

@@ -4,6 +4,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use cohaptic_tests_common::quarter_by_day;
+
 use super::programs::{Compiler, Language, Running, example};
 
 fn source(name: &str) -> PathBuf {
@@ -37,7 +39,7 @@ fn no_datagram_breaks_the_parser_of_the_header() {
         &[]
     };
     let Some((_folder, program)) = Compiler::C99.compile(&source("fuzz.c"), options) else { return };
-    let out = passes(&program, &["50000", "1"]);
+    let out = passes(&program, &[&quarter_by_day(50_000).to_string(), "1"]);
     assert!(out.ends_with("refused\n"), "{out}");
 }
 

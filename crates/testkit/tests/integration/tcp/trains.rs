@@ -10,6 +10,7 @@ use cohaptic_testkit::proptest::prelude::*;
 use cohaptic_testkit::strategies::{ImpairedNetwork, LinkBounds, Stage, any_network, networks_like};
 use cohaptic_testkit::tcp::TcpConfig;
 use cohaptic_testkit::{Bed, TcpListener, TcpStream, Testbed, time};
+use cohaptic_tests_common::cases;
 
 use crate::tcp::{millis, octets};
 
@@ -187,7 +188,7 @@ async fn program(bed: Bed, plan: Plan) -> Vec<String> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(100))]
 
     /// Programs see the same at the same instants, in the same order, whether packets are recorded or not.
     #[test]

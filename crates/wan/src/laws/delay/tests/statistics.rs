@@ -1,3 +1,5 @@
+use cohaptic_tests_common::quarter_by_day;
+
 use super::*;
 use crate::random::{Purpose, Stream};
 
@@ -42,7 +44,7 @@ fn draws(law: &Law, seed: u64, count: u64) -> Vec<f64> {
 
 #[test]
 fn draws_have_the_law() {
-    let count = 100_000;
+    let count = quarter_by_day(100_000);
     for (seed, (name, law)) in (1..).zip(every_law()) {
         let distance = distance(draws(&law, seed, count), name, &law);
         assert!(distance < KS / libm::sqrt(count as f64), "{name} {:?}: {distance}", law.fit.standard);

@@ -1,5 +1,7 @@
 //! Effects of correlation in the kernel: loss nearly vanishes, and delays stay independent.
 
+use cohaptic_tests_common::quarter_by_day;
+
 use crate::netem::kernel::tests::{SIZE, at, autocorrelation, qdisc};
 use crate::netem::kernel::{Output, Qdisc};
 
@@ -60,15 +62,15 @@ fn correlated_loss_loses_next_to_nothing() {
         ("loss 10% 50%", 0.1, 0.5, 0.001_04, 5e-6),
         ("loss 30% 50%", 0.3, 0.5, 0.129, 5e-4),
     ];
-    let draws = 2_000_000_u64;
+    let draws = quarter_by_day(2_000_000);
     for (words, p, rho, figure, digit) in published {
         let expected = below(p, rho);
         // A binomial count has its variance inflated by at most (1 + ρ)/(1 − ρ) for the correlation of neighbours. The tolerance is five standard errors and
         // one packet, a significance below 10⁻⁶.
-        let error = 5.0 * (expected * (1.0 - expected) * (1.0 + rho) / (1.0 - rho) / draws as f64).sqrt() + 1.0 / draws as f64;
-        assert!((expected - figure).abs() < error + digit, "{words}: published {figure}, law {expected}");
+        let error = |draws: f64| 5.0 * (expected * (1.0 - expected) * (1.0 + rho) / (1.0 - rho) / draws).sqrt() + 1.0 / draws;
+        assert!((expected - figure).abs() < error(2e6) + digit, "{words}: published {figure}, law {expected}");
         let lost = losses(words, 1, draws) as f64 / draws as f64;
-        assert!((lost - expected).abs() < error, "{words}: lost {lost}, law {expected}");
+        assert!((lost - expected).abs() < error(draws as f64), "{words}: lost {lost}, law {expected}");
     }
     let uncorrelated = losses("loss 5%", 1, draws) as f64 / draws as f64;
     assert!((uncorrelated - 0.05).abs() < 5.0 * (0.05 * 0.95 / draws as f64).sqrt());
@@ -88,16 +90,19 @@ fn delays(words: &str, count: u64) -> Vec<f64> {
         .collect()
 }
 
-/// Published: the autocorrelation of neighbours for each requested correlation. 10⁶ draws have a standard error of 0.001, and the tolerance is four of these.
+/// Published: the autocorrelation of neighbours for each requested correlation. The standard error of n draws is 1/√n, and the tolerance is four of these, or
+/// five for the normal law. The published figures have an error of 0.001 of their own.
 #[test]
 fn correlated_delay_is_not_correlated() {
     let uniform = [(25.0, 0.000), (50.0, 0.000), (90.0, 0.005), (99.0, 0.051)];
+    let draws = quarter_by_day(1_000_000);
+    let error = 1.0 / (draws as f64).sqrt();
     for (asked, published) in uniform {
-        let actual = autocorrelation(&delays(&format!("delay 100ms 10ms {asked}%"), 1_000_000), 1);
-        assert!((actual - published).abs() < 0.004, "{asked} %: {actual}");
+        let actual = autocorrelation(&delays(&format!("delay 100ms 10ms {asked}%"), draws), 1);
+        assert!((actual - published).abs() < 4.0 * error, "{asked} %: {actual}");
     }
     for asked in [25.0, 50.0, 90.0, 99.0, 99.9] {
-        let actual = autocorrelation(&delays(&format!("delay 100ms 10ms {asked}% distribution normal"), 1_000_000), 1);
-        assert!(actual.abs() < 0.005, "{asked} %: {actual}");
+        let actual = autocorrelation(&delays(&format!("delay 100ms 10ms {asked}% distribution normal"), draws), 1);
+        assert!(actual.abs() < 5.0 * error, "{asked} %: {actual}");
     }
 }
