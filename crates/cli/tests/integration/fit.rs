@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use cohaptic_tests_common::are_all;
 use serde_json::Value;
 
 use crate::integration::desk::Desk;
@@ -72,7 +73,8 @@ fn measurements_are_read_and_a_drift_is_removed() {
 #[test]
 fn a_drift_is_removed_only_where_there_is_one() {
     let desk = Desk::new();
-    for (nanos_each_ms, seed) in [(0, 1), (0, 2), (20, 3), (-20, 4), (100, 5), (-1000, 6)] {
+    let drifts = [(0, 1), (20, 3), (-1000, 6), (0, 2), (-20, 4), (100, 5)];
+    for &(nanos_each_ms, seed) in if are_all() { &drifts[..] } else { &drifts[..3] } {
         drifting(&desk, &format!("link delay 40ms 4ms distribution normal --packets 40000 --seed {seed}"), nanos_each_ms);
         let document = desk.json("fit m.csv --skew --json");
         let (skew, drift) = (&document["skew"], 1e-6 * f64::from(nanos_each_ms));
