@@ -353,6 +353,16 @@ mod tests {
         assert!(held.accept(0, u64::MAX, Instant::ZERO, at(4.0)) && !held.accept(0, u64::MAX, Instant::ZERO, at(5.0)));
     }
 
+    #[test]
+    fn weighted_samples_are_held_times_their_weights() {
+        let mut held = Held::of_some([(2, at(1.0)), (5, at(2.0))], Some(vec![0.5, 1.5]));
+        assert_eq!((held.state(0), held.state(1)), (Some(&at(0.5)), Some(&at(3.0))));
+        assert!(held.accept(0, 0, Instant::ZERO, at(8.0)) && held.accept(1, 7, Instant::ZERO, at(4.0)));
+        assert_eq!((held.state(0), held.state(1)), (Some(&at(4.0)), Some(&at(6.0))));
+        held.refresh();
+        assert_eq!(*held.mean(), at(5.0));
+    }
+
     /// Ages of 30 ms and, limited by the horizon, 33 ms give (0.030·(−1) + 0.033·(−2))/2. No age is below zero.
     #[test]
     fn samples_move_on_up_to_the_horizon() {
