@@ -34,7 +34,7 @@ mod settling;
 mod stiffness;
 mod wave;
 
-use cohaptic_tests::same_cases;
+use cohaptic_tests_common::same_cases;
 use proptest::prelude::ProptestConfig;
 
 /// A tick of all peers here \[s\].

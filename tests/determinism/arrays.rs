@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use cohaptic_harness::{Ending, Model, NoObserver, Observer, Simulation, Summary, run_side_by_side, same_shape};
 use cohaptic_scene::Scene;
-use cohaptic_tests::{Draft, are_all, cases, drafts, shipped_scenes};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::{Draft, drafts, shipped_scenes};
+use cohaptic_tests_common::{are_all, cases, properties};
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 

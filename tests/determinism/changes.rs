@@ -7,8 +7,8 @@ use cohaptic_harness::{Ending, Model, NoObserver, Simulation, run_side_by_side, 
 use cohaptic_peer::coordination::{LawForm, LawSettings, LawValue};
 use cohaptic_peer::{Contact, Coordination, Direction, Gains, Hand, Signal};
 use cohaptic_scene::{Change, ChangeKind, LinkChange, Scene};
-use cohaptic_tests::{Draft, cases, drafts};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::{Draft, drafts};
+use cohaptic_tests_common::{cases, properties};
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;

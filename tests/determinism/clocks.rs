@@ -5,8 +5,8 @@ use std::time::Duration;
 use cohaptic_harness::{Ending, Model};
 use cohaptic_peer::Drift;
 use cohaptic_scene::Scene;
-use cohaptic_tests::{are_all, cases, drafts};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::drafts;
+use cohaptic_tests_common::{are_all, cases, properties};
 use proptest::collection::vec;
 use proptest::prelude::*;
 

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use cohaptic_harness::{Model, NoObserver, Observer, Simulation, TickRow};
 use cohaptic_scene::Scene;
-use cohaptic_tests::{cases, drafts, first_difference, quarter_by_day, record, run, shipped_scenes};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::{drafts, first_difference, record, run, shipped_scenes};
+use cohaptic_tests_common::{cases, properties, quarter_by_day};
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 

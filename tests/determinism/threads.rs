@@ -1,8 +1,8 @@
 //! Twice, one after the other and on several threads at once.
 
 use cohaptic_harness::Model;
-use cohaptic_tests::{Records, cases, drafts, record};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::{Records, drafts, record};
+use cohaptic_tests_common::{cases, properties};
 use proptest::prelude::*;
 
 properties! {

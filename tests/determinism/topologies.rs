@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use cohaptic_harness::{Model, NoObserver, Simulation, Summary, run_side_by_side, same_shape};
 use cohaptic_scene::{ChangeKind, Scene, Topology};
-use cohaptic_tests::{Draft, cases, drafts, record};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::{Draft, drafts, record};
+use cohaptic_tests_common::{cases, properties};
 use cohaptic_units::parse;
 use proptest::prelude::*;
 

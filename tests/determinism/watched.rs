@@ -5,8 +5,8 @@ use std::time::Duration;
 use cohaptic_harness::{Ending, InstantRow, Model, Observer, Simulation, Summary, TickRow, Ticks, same_shape};
 use cohaptic_peer::Contact;
 use cohaptic_scene::Scene;
-use cohaptic_tests::{cases, drafts};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::drafts;
+use cohaptic_tests_common::{cases, properties};
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 

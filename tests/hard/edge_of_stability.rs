@@ -17,7 +17,8 @@
 use cohaptic_harness::{Model, Simulation, TickRow};
 use cohaptic_peer::{Contact, Gains};
 use cohaptic_stability::{Boundary, BoundaryOptions, Cell, KeyRange, Method, Monodromy, StateKind, Verdict, analyse, monodromy};
-use cohaptic_tests::{Draft, quarter_by_day};
+use cohaptic_tests::Draft;
+use cohaptic_tests_common::quarter_by_day;
 
 use crate::eigenvectors::{LeftEigenvector, left_eigenvectors};
 use crate::hard::ROUNDING;

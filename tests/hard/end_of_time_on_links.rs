@@ -3,8 +3,7 @@
 
 use std::time::Duration;
 
-use cohaptic_tests::same_cases;
-use cohaptic_tests_common::properties;
+use cohaptic_tests_common::{properties, same_cases};
 use cohaptic_units::{Bytes, Ecn, Instant, Probability, Rate};
 use cohaptic_wan::{
     Bottleneck, Chance, CoDel, Correlation, Delay, DeliveryTrace, Discipline, Displacement, Distribution, DualPi2, Fate, FqCoDel, Framing,

@@ -11,7 +11,8 @@
 //! computed with 31 digits, at whole numbers of ticks. By day an hour is a quarter of one.
 
 use cohaptic_harness::{Model, Simulation, TickRow};
-use cohaptic_tests::{Draft, DraftHand, quarter_by_day};
+use cohaptic_tests::{Draft, DraftHand};
+use cohaptic_tests_common::quarter_by_day;
 use qd::Quad;
 
 use crate::hard::ROUNDING;

@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use cohaptic_harness::{Model, NoObserver, Simulation};
 use cohaptic_peer::Signal;
-use cohaptic_tests::{Draft, DraftPeer, quarter_by_day};
+use cohaptic_tests::{Draft, DraftPeer};
+use cohaptic_tests_common::quarter_by_day;
 use cohaptic_units::{Hertz, Instant};
 use cohaptic_wan::Fate;
 

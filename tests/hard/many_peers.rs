@@ -6,8 +6,8 @@
 
 use cohaptic_harness::{Model, NoObserver, Simulation};
 use cohaptic_peer::{EXACT_FROM, Held, State};
-use cohaptic_tests::{Draft, same_cases};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::Draft;
+use cohaptic_tests_common::{properties, same_cases};
 use cohaptic_units::Instant;
 
 use crate::hard::ROUNDING;

@@ -7,7 +7,8 @@
 use std::time::Duration;
 
 use cohaptic_harness::{Model, Simulation, TickRow};
-use cohaptic_tests::{Draft, quarter_by_day};
+use cohaptic_tests::Draft;
+use cohaptic_tests_common::quarter_by_day;
 use cohaptic_units::{Bytes, Instant, Probability, Rate};
 use cohaptic_wan::{
     Bottleneck, Chance, Delay, Distribution, Fate, Jitter, Link, LinkConfig, LinkName, Loss, Network, NetworkConfig, NodeId, PacketEvent,

@@ -4,8 +4,8 @@ use std::convert::Infallible;
 
 use cohaptic_harness::{Model, Observer, Simulation};
 use cohaptic_scene::Scene;
-use cohaptic_tests::{cases, shipped_scenes};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::shipped_scenes;
+use cohaptic_tests_common::{cases, properties};
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 

@@ -5,8 +5,8 @@ use cohaptic_peer::coordination::Pull;
 use cohaptic_peer::{Coordination, Gains};
 use cohaptic_scene::Scene;
 use cohaptic_stability::{Method, analyse};
-use cohaptic_tests::{cases, drafts, first_difference, run};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::{drafts, first_difference, run};
+use cohaptic_tests_common::{cases, properties};
 use proptest::prelude::*;
 
 properties! {

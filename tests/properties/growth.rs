@@ -6,8 +6,8 @@
 use cohaptic_harness::Model;
 use cohaptic_peer::Contact;
 use cohaptic_stability::{Method, Monodromy, StateKind, analyse, monodromy};
-use cohaptic_tests::{Draft, DraftHand, DraftLink, Log, Tick, cases, drafts, run};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::{Draft, DraftHand, DraftLink, Log, Tick, drafts, run};
+use cohaptic_tests_common::{cases, properties};
 use proptest::prelude::*;
 use proptest::sample::select;
 

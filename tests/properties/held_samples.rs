@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 
 use cohaptic_harness::Model;
-use cohaptic_tests::{Body, Draft, Log, cases, drafts, run};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::{Body, Draft, Log, drafts, run};
+use cohaptic_tests_common::{cases, properties};
 use cohaptic_units::Instant;
 use cohaptic_wan::Fate;
 use proptest::prelude::*;

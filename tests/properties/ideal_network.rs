@@ -3,8 +3,8 @@
 
 use cohaptic_harness::Model;
 use cohaptic_peer::Coordination;
-use cohaptic_tests::{Draft, Log, cases, drafts, run};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::{Draft, Log, drafts, run};
+use cohaptic_tests_common::{cases, properties};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;

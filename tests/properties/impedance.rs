@@ -9,8 +9,8 @@ use cohaptic_harness::measures::Measures;
 use cohaptic_peer::{Contact, Coordination, Gains};
 use cohaptic_scene::{Measure, MeasureName, MeasureSettings, MeasureSpec, Scene};
 use cohaptic_stability::{Method, admittance, analyse};
-use cohaptic_tests::{Draft, DraftHand, cases, drafts};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::{Draft, DraftHand, drafts};
+use cohaptic_tests_common::{cases, properties};
 use proptest::prelude::*;
 use proptest::sample::select;
 

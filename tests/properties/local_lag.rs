@@ -7,8 +7,8 @@ use cohaptic_peer::Coordination;
 use cohaptic_peer::coordination::LawValue;
 use cohaptic_stability::{Method, analyse};
 use cohaptic_tests::drafts::anything;
-use cohaptic_tests::{Draft, cases, run};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::{Draft, run};
+use cohaptic_tests_common::{cases, properties};
 use proptest::prelude::*;
 
 fn both(draft: Draft) -> (Draft, Draft) {

@@ -3,8 +3,8 @@
 use cohaptic_harness::{Model, Simulation, Strategies};
 use cohaptic_peer::{Command, Context, Coordination, Gains, State, Strategy};
 use cohaptic_scene::Scene;
-use cohaptic_tests::{cases, drafts, first_difference, keep, run};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::{drafts, first_difference, keep, run};
+use cohaptic_tests_common::{cases, properties};
 use proptest::prelude::*;
 
 /// Average-position coordination written again, from the samples one by one.

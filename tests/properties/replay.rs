@@ -11,8 +11,8 @@ use core::f64::consts::TAU;
 
 use cohaptic_harness::Model;
 use cohaptic_peer::{Contact, Coordination};
-use cohaptic_tests::{Draft, DraftHand, Tick, cases, drafts, run};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::{Draft, DraftHand, Tick, drafts, run};
+use cohaptic_tests_common::{cases, properties};
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 

@@ -2,8 +2,8 @@
 
 use cohaptic_harness::Model;
 use cohaptic_peer::wire::SampleKind;
-use cohaptic_tests::{Draft, Log, Tick, cases, drafts, run};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::{Draft, Log, Tick, drafts, run};
+use cohaptic_tests_common::{cases, properties};
 use proptest::prelude::*;
 
 properties! {

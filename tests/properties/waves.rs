@@ -5,8 +5,8 @@ use cohaptic_harness::Model;
 use cohaptic_peer::coordination::LawValue;
 use cohaptic_peer::{Contact, Coordination};
 use cohaptic_stability::{Monodromy, StateKind, monodromy};
-use cohaptic_tests::{Draft, DraftHand, DraftLink, Log, cases, drafts, run};
-use cohaptic_tests_common::properties;
+use cohaptic_tests::{Draft, DraftHand, DraftLink, Log, drafts, run};
+use cohaptic_tests_common::{cases, properties};
 use proptest::collection::vec;
 use proptest::prelude::*;
 

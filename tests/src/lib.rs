@@ -26,37 +26,6 @@ pub use records::{Records, record};
 
 use std::path::{Path, PathBuf};
 
-use proptest::prelude::ProptestConfig;
-use proptest::test_runner::RngSeed;
-
-/// The variable of the environment with which a property test draws all of its cases. `.ci/nightly` sets it.
-pub const ALL_CASES_VARIABLE: &str = "COHAPTIC_TEST_ALL_CASES";
-
-/// Returns whether all cases are asked for, by [`ALL_CASES_VARIABLE`].
-#[must_use]
-pub fn are_all() -> bool {
-    std::env::var_os(ALL_CASES_VARIABLE).is_some()
-}
-
-/// Returns `all` ticks, packets or milliseconds of a test if [`ALL_CASES_VARIABLE`] is set, and a quarter of them otherwise.
-#[must_use]
-pub fn quarter_by_day(all: u64) -> u64 {
-    if are_all() { all } else { all.div_ceil(4) }
-}
-
-/// A property test that leaves no files behind. It draws `count` cases if [`ALL_CASES_VARIABLE`] is set, and the first quarter of them otherwise.
-#[must_use]
-pub fn cases(count: u32) -> ProptestConfig {
-    let cases = if are_all() { count } else { count.div_ceil(4) };
-    ProptestConfig { cases, failure_persistence: None, max_shrink_iters: 400, ..ProptestConfig::default() }
-}
-
-/// [`cases`] that are the same at every run.
-#[must_use]
-pub fn same_cases(count: u32, seed: u64) -> ProptestConfig {
-    ProptestConfig { rng_seed: RngSeed::Fixed(seed), ..cases(count) }
-}
-
 /// The shipped scenes, in order of their paths.
 #[must_use]
 pub fn shipped_scenes() -> Vec<PathBuf> {

@@ -8,13 +8,12 @@ use std::fmt;
 
 use proptest::prelude::{ProptestConfig, Strategy};
 use proptest::strategy::BoxedStrategy;
-use proptest::test_runner::{TestCaseResult, TestRunner, contextualize_config};
+use proptest::test_runner::{RngSeed, TestCaseResult, TestRunner, contextualize_config};
 
 #[doc(hidden)]
 pub use proptest;
 
-/// The variable of the environment with which a property test draws all of its cases. `.ci/nightly` sets it. The library `cohaptic-tests` repeats this variable
-/// and its functions, because Cargo packages no library that depends on an unpublished one.
+/// The variable of the environment with which a property test draws all of its cases. `.ci/nightly` sets it.
 pub const ALL_CASES_VARIABLE: &str = "COHAPTIC_TEST_ALL_CASES";
 
 /// Returns whether all cases are asked for, by [`ALL_CASES_VARIABLE`].
@@ -34,7 +33,13 @@ pub fn quarter_by_day(all: u64) -> u64 {
 #[must_use]
 pub fn cases(count: u32) -> ProptestConfig {
     let cases = if are_all() { count } else { count.div_ceil(4) };
-    ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
+    ProptestConfig { cases, failure_persistence: None, max_shrink_iters: 400, ..ProptestConfig::default() }
+}
+
+/// Returns the configuration of [`cases`] that are the same at every run.
+#[must_use]
+pub fn same_cases(count: u32, seed: u64) -> ProptestConfig {
+    ProptestConfig { rng_seed: RngSeed::Fixed(seed), ..cases(count) }
 }
 
 /// Declares property tests in the form of `proptest!`.

@@ -27,8 +27,8 @@ pub(super) struct Chains {
     cubics: GammaCubics,
 }
 
-/// State of the chain of delays and of the chain of losses, indexed by link, for links without further state. Padded by seven links, so a load of eight links starting at any link stays within
-/// the arrays.
+/// State of the chain of delays and of the chain of losses, indexed by link, for links without further state. Padded by seven links, so a load of eight links
+/// starting at any link stays within the arrays.
 #[derive(Clone, Debug)]
 pub(super) struct ChainStates {
     /// Latest value of the chain of delays; NaN before the first packet.
